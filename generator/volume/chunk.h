@@ -1,0 +1,37 @@
+// A chunk: N x M x N voxels as limits, cut out of a stack.
+//
+// A chunk column has the last limit at or below the chunk's floor, all limits inside, and the first
+// at or above its ceiling, so that interpolation gives the same values in every chunk. A chunk that
+// is one composition throughout is `uniform` and has no columns.
+#pragma once
+
+#include <cstdint>
+
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "protocol/base/coords.h"
+
+namespace terrane {
+
+struct Chunk {
+    ChunkPos position;
+    std::int32_t side = 0;    ///< N
+    std::int32_t height = 0;  ///< M
+    bool uniform = false;
+    PaletteEntry uniform_content;  ///< meaningful if `uniform`; flow is 0 then
+    ColumnGrid columns;            ///< columns 0..N-1; empty if `uniform`
+    /// The stack's palette entries that the chunk's limits use, in ascending stack id; limits hold
+    /// positions in this list.
+    Palette palette;
+    std::vector<std::uint16_t> stack_palette_ids;  ///< id in the stack of each palette entry
+
+    friend bool operator==(const Chunk&, const Chunk&) = default;
+};
+
+/// Cuts the chunk at height `y` (in chunk heights, any int32) out of `stack`. `out` is overwritten;
+/// its buffers are reused. Below the ground (y < 0) the chunk is uniform base. Thread: any, `out`
+/// being the caller's own. Only level 0.
+void cut_chunk(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height);
+
+}  // namespace terrane

@@ -1,0 +1,25 @@
+#include "server/cli/program.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+namespace terrane {
+
+int run_program(int argc, char** argv) {
+    CLI::App app("Terrane makes volumetric terrain on request and streams it.", "terrane");
+    app.require_subcommand(1);
+    app.set_help_all_flag("--help-all", "Print the help of every subcommand");
+    int exit_code = kExitDone;
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? kExitDone : kExitWrongUse;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "terrane: %s\n", error.what());
+        return kExitFailed;
+    }
+    return exit_code;
+}
+
+}  // namespace terrane

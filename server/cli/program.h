@@ -1,0 +1,20 @@
+// The command line: parses, runs one subcommand, and turns its outcome into an exit code.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace terrane {
+
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitFailed = 1;
+inline constexpr int kExitWrongUse = 2;
+
+/// Runs `terrane` with these arguments. Prints to stdout and stderr; never throws.
+int run_program(int argc, char** argv);
+
+// Each adds one subcommand. Its callback stores the exit code in `exit_code`; `exit_code` and `app`
+// outlive the parse.
+
+}  // namespace terrane
