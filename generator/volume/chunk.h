@@ -5,12 +5,12 @@
 // is one composition throughout is `uniform` and has no columns.
 #pragma once
 
-#include <cstdint>
-
 #include "generator/volume/limit.h"
 #include "generator/volume/stack.h"
 #include "generator/world/composition.h"
 #include "protocol/base/coords.h"
+
+#include <cstdint>
 
 namespace terrane {
 

@@ -1,24 +1,44 @@
 // Chunks and stacks as bytes. The layout, byte by byte, is in CHUNK_FORMAT.md.
+//
+// Threads: every function from any thread; nothing is shared. Built without exceptions in mind:
+// every decoding error is a Result.
 #pragma once
-
-#include <cstdint>
-#include <span>
 
 #include "generator/volume/chunk.h"
 #include "generator/volume/stack.h"
 #include "protocol/base/bytes.h"
 #include "protocol/base/result.h"
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
 namespace terrane {
 
-/// Appends nothing to what was there: `out` is overwritten. The bytes are a pure function of the
-/// chunk; they are what `terrane verify` hashes and what COLUMNS payloads carry (before zstd).
-void encode_chunk(Bytes& out, const Chunk& chunk);
+inline constexpr std::uint8_t kChunkFormatVersion = 1;
+
+/// The flow is a plane of its own and may be left out; it then decodes as 0.
+enum class FlowPlane : std::uint8_t { with, without };
+
+// Sanity limits of the decoder, checked before anything is allocated.
+inline constexpr std::int32_t kChunkSideMax = 64;    ///< columns; Grid::side's bound
+inline constexpr std::int32_t kChunkHeightMax = 64;  ///< voxels; Grid::height's bound
+inline constexpr std::size_t kPaletteEntriesMax = 65536;
+inline constexpr std::size_t kLimitsMax = std::size_t{1} << 24U;
+/// No encoding of less than a byte for 32 limits is accepted (or made: the encoder pads), so that a
+/// small payload can't ask for much memory.
+inline constexpr std::size_t kLimitsPerByteMax = 32;
+
+/// `out` is overwritten. The bytes are a pure function of the chunk; with the flow they are what
+/// `terrane verify` hashes, and they are what COLUMNS payloads carry (before zstd). Needs what
+/// cut_chunk gives: columns 0..N-1 (none if uniform), palette positions in range, ascending stack
+/// ids; the limits themselves may be anything.
+void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow = FlowPlane::with);
 
 /// Every length and id is checked; fails with `malformed`, `too_large` or `version_mismatch`.
 Result<Chunk> decode_chunk(std::span<const std::byte> bytes);
 
-/// A whole stack with its apron, for the store.
+/// A whole stack with its apron (columns -1..N), flow included, for the store.
 void encode_stack(Bytes& out, const Stack& stack);
 Result<Stack> decode_stack(std::span<const std::byte> bytes);
 

@@ -5,12 +5,12 @@
 // void for ever. Heights are 1/256 voxel.
 #pragma once
 
+#include "generator/world/composition.h"
+
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "generator/world/composition.h"
 
 namespace terrane {
 
@@ -33,9 +33,9 @@ struct Limit {
     friend bool operator==(const Limit&, const Limit&) = default;
 };
 
-/// A rectangle of columns with their limits, stored one behind the other (CSR). Column (x, z) of the
-/// rectangle has local coordinates x_first <= x < x_first + width, likewise z over length; rows run
-/// along x, z is the slow index.
+/// A rectangle of columns with their limits, stored one behind the other (CSR). Column (x, z) of
+/// the rectangle has local coordinates x_first <= x < x_first + width, likewise z over length; rows
+/// run along x, z is the slow index.
 struct ColumnGrid {
     std::int32_t x_first = 0;
     std::int32_t z_first = 0;

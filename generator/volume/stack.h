@@ -1,11 +1,11 @@
 // A chunk stack: every height over one N x N square. The unit of generation, cache and storage.
 #pragma once
 
-#include <cstdint>
-
 #include "generator/volume/limit.h"
 #include "generator/world/composition.h"
 #include "protocol/base/coords.h"
+
+#include <cstdint>
 
 namespace terrane {
 
