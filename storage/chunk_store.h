@@ -7,16 +7,16 @@
 // Threads: every call from any thread at any time.
 #pragma once
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
-
-#include "protocol/base/bytes.h"
-#include "protocol/base/coords.h"
-#include "protocol/base/hash.h"
-#include "protocol/base/result.h"
 
 namespace terrane {
 
@@ -33,18 +33,18 @@ struct RecordKey {
 
 /// Whose records a store holds: a store opened for one identity never shows another's.
 struct StoreIdentity {
-    Hash128 fingerprint;                  ///< names stacks
-    Hash128 content_id;                   ///< names meshes
+    Hash128 fingerprint;  ///< names stacks
+    Hash128 content_id;   ///< names meshes
     std::uint32_t generator_version = 0;
-    std::string world_name;               ///< for messages only
+    std::string world_name;  ///< for messages only
 };
 
 struct StoreStats {
     std::uint64_t gets = 0;
     std::uint64_t hits = 0;
     std::uint64_t puts = 0;
-    std::uint64_t corrupt = 0;    ///< records found damaged (and treated as missing)
-    std::uint64_t failures = 0;   ///< reads or writes the disk refused
+    std::uint64_t corrupt = 0;   ///< records found damaged (and treated as missing)
+    std::uint64_t failures = 0;  ///< reads or writes the disk refused
 };
 
 struct RecordToPut {

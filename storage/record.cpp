@@ -1,0 +1,178 @@
+#include "storage/record.h"
+
+#include "protocol/base/check.h"
+
+#include <xxhash.h>
+
+#include <initializer_list>
+
+namespace terrane {
+namespace {
+
+constexpr std::size_t kNameLengthBytes = 2;
+constexpr std::size_t kMetadataHeadBytes = 4 + 16 + 16 + 4 + kNameLengthBytes;
+
+/// Most significant byte first, so that bytes sort as numbers do.
+void append_big_endian(std::string& out, std::uint64_t value, std::size_t size_bytes) {
+    for (std::size_t i = size_bytes; i-- > 0;) {
+        out.push_back(static_cast<char>((value >> (8 * i)) & 0xFFU));
+    }
+}
+
+void append_hash(std::string& out, Hash128 hash) {
+    append_big_endian(out, hash.high, 8);
+    append_big_endian(out, hash.low, 8);
+}
+
+/// Morton order: the values' top bits first, one bit of each in turn. The sign bit is flipped so
+/// that negative coordinates sort below positive ones.
+void append_interleaved(std::string& out, std::initializer_list<std::int32_t> values) {
+    unsigned byte = 0;
+    unsigned bits = 0;
+    for (unsigned bit = 32; bit-- > 0;) {
+        for (const std::int32_t value : values) {
+            const std::uint32_t biased = static_cast<std::uint32_t>(value) ^ 0x80000000U;
+            byte = (byte << 1U) | ((biased >> bit) & 1U);
+            if (++bits == 8) {
+                out.push_back(static_cast<char>(byte));
+                byte = 0;
+                bits = 0;
+            }
+        }
+    }
+}
+
+struct XxhState {
+    XXH3_state_t* state = XXH3_createState();
+
+    XxhState() { TERRANE_ASSERT(state != nullptr); }
+
+    ~XxhState() { XXH3_freeState(state); }
+
+    XxhState(const XxhState&) = delete;
+    XxhState& operator=(const XxhState&) = delete;
+};
+
+/// XXH3-128 over version, key and value, so that a value filed under another key does not pass.
+Hash128 record_checksum(std::uint8_t version, std::string_view key,
+                        std::span<const std::byte> value) {
+    thread_local const XxhState hasher;
+    XXH3_128bits_reset(hasher.state);
+    XXH3_128bits_update(hasher.state, &version, 1);
+    XXH3_128bits_update(hasher.state, key.data(), key.size());
+    XXH3_128bits_update(hasher.state, value.data(), value.size());
+    const XXH128_hash_t hash = XXH3_128bits_digest(hasher.state);
+    return {.high = hash.high64, .low = hash.low64};
+}
+
+}  // namespace
+
+std::string encode_key(const StoreIdentity& identity, const RecordKey& key) {
+    TERRANE_ASSERT(key.position.lod >= 0 && key.position.lod <= 255);
+    const bool stacks = key.family == Family::stacks;
+    std::string out;
+    out.reserve(36);
+    out.push_back(stacks ? 's' : 'm');
+    append_hash(out, stacks ? identity.fingerprint : identity.content_id);
+    append_big_endian(out, identity.generator_version, 4);
+    append_big_endian(out, key.format, 1);
+    append_big_endian(out, static_cast<std::uint64_t>(key.position.lod), 1);
+    if (stacks) {
+        append_interleaved(out, {key.position.x, key.position.z});
+    } else {
+        append_interleaved(out, {key.position.x, key.position.z, key.position.y});
+    }
+    return out;
+}
+
+void frame_value(Bytes& out, std::string_view key, std::span<const std::byte> value) {
+    const Hash128 checksum = record_checksum(kRecordVersion, key, value);
+    out.clear();
+    out.reserve(kRecordHeadBytes + value.size());
+    ByteWriter writer(out);
+    writer.fixed(kRecordVersion);
+    writer.fixed(checksum.high);
+    writer.fixed(checksum.low);
+    writer.raw(value);
+}
+
+Result<std::span<const std::byte>> unframe_value(std::string_view key,
+                                                 std::span<const std::byte> framed) {
+    ByteReader reader(framed);
+    const auto version = reader.fixed<std::uint8_t>();
+    const auto high = reader.fixed<std::uint64_t>();
+    const auto low = reader.fixed<std::uint64_t>();
+    if (!version || !high || !low) {
+        return fail(ErrorCode::corrupt,
+                    "record: cut short at " + std::to_string(framed.size()) + " bytes");
+    }
+    const auto value = framed.subspan(kRecordHeadBytes);
+    if (record_checksum(*version, key, value) != Hash128{.high = *high, .low = *low}) {
+        return fail(ErrorCode::corrupt, "record: the checksum does not fit");
+    }
+    if (*version != kRecordVersion) {
+        return fail(ErrorCode::version_mismatch, "record: version " + std::to_string(*version) +
+                                                     ", this build reads " +
+                                                     std::to_string(kRecordVersion));
+    }
+    return value;
+}
+
+void encode_metadata(Bytes& out, const StoreMetadata& metadata) {
+    Bytes value;
+    ByteWriter writer(value);
+    writer.fixed(metadata.format);
+    writer.fixed(metadata.identity.fingerprint.high);
+    writer.fixed(metadata.identity.fingerprint.low);
+    writer.fixed(metadata.identity.content_id.high);
+    writer.fixed(metadata.identity.content_id.low);
+    writer.fixed(metadata.identity.generator_version);
+    const std::string_view name =
+        std::string_view(metadata.identity.world_name).substr(0, kStoredNameBytesMax);
+    writer.fixed(static_cast<std::uint16_t>(name.size()));
+    writer.raw(bytes_of(name));
+    frame_value(out, kMetadataKey, value);
+}
+
+Result<StoreMetadata> decode_metadata(std::span<const std::byte> framed) {
+    const auto value = unframe_value(kMetadataKey, framed);
+    if (!value) {
+        return tl::unexpected(value.error());
+    }
+    ByteReader reader(*value);
+    const auto format = reader.fixed<std::uint32_t>();
+    if (format && *format > kStoreFormat) {
+        return fail(ErrorCode::version_mismatch, "store format " + std::to_string(*format) +
+                                                     ", this build reads up to " +
+                                                     std::to_string(kStoreFormat));
+    }
+    if (!format || *format == 0 || value->size() < kMetadataHeadBytes) {
+        return fail(ErrorCode::corrupt, "store metadata: cut short");
+    }
+    StoreMetadata metadata{.format = *format, .identity = {}};
+    metadata.identity.fingerprint.high = *reader.fixed<std::uint64_t>();
+    metadata.identity.fingerprint.low = *reader.fixed<std::uint64_t>();
+    metadata.identity.content_id.high = *reader.fixed<std::uint64_t>();
+    metadata.identity.content_id.low = *reader.fixed<std::uint64_t>();
+    metadata.identity.generator_version = *reader.fixed<std::uint32_t>();
+    const std::size_t name_bytes = *reader.fixed<std::uint16_t>();
+    if (name_bytes != reader.remaining() || name_bytes > kStoredNameBytesMax) {
+        return fail(ErrorCode::corrupt, "store metadata: the name has another length than it says");
+    }
+    metadata.identity.world_name = std::string(text_of(*reader.take(name_bytes)));
+    return metadata;
+}
+
+Result<void> check_identity(const StoreIdentity& stored, const StoreIdentity& wanted,
+                            std::string_view place) {
+    if (stored.fingerprint == wanted.fingerprint) {
+        return {};
+    }
+    return fail(ErrorCode::wrong_world, std::string(place) + ": holds world '" + stored.world_name +
+                                            "' (fingerprint " + to_hex(stored.fingerprint) +
+                                            "), not '" + wanted.world_name + "' (fingerprint " +
+                                            to_hex(wanted.fingerprint) +
+                                            "); use another --data directory or remove this one");
+}
+
+}  // namespace terrane
