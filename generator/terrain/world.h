@@ -9,14 +9,12 @@
 
 #include "generator/terrain/layer_stack.h"
 #include "generator/world/composition.h"
+#include "generator/world/generator_version.h"
 #include "generator/world/world_definition.h"
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
 
 namespace terrane {
-
-/// Raised whenever the same world file gives other limits.
-inline constexpr std::uint32_t kGeneratorVersion = 1;
 
 struct World {
     WorldDefinition definition;

@@ -1,13 +1,13 @@
 // A mix of materials with concentrations, and the palette that limits refer to.
 #pragma once
 
+#include "generator/world/world_definition.h"
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "generator/world/world_definition.h"
 
 namespace terrane {
 

@@ -41,9 +41,9 @@ struct Material {
     Rgb8 color;
     std::string texture;  ///< file name beside the world file, or empty
     MaterialKind kind = MaterialKind::regular;
-    bool alone = false;   ///< never mixed with another material
-    double area = 0;      ///< vein and cave: share of the general area
-    Range depth;          ///< 0 surface, 1 bottom
+    bool alone = false;  ///< never mixed with another material
+    double area = 0;     ///< vein and cave: share of the general area
+    Range depth;         ///< 0 surface, 1 bottom
     Range thickness;
     Range roughness;
     double similarity = 0;

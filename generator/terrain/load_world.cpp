@@ -1,0 +1,28 @@
+#include "generator/terrain/load_world.h"
+
+#include <string>
+#include <utility>
+
+namespace terrane {
+
+LoadedWorld load_world(const std::filesystem::path& path) {
+    return build_world(load_world_file(path), path.string());
+}
+
+LoadedWorld build_world(WorldFileResult file, std::string_view name) {
+    if (!file.ok()) {
+        return {.world = nullptr, .faults = std::move(file.faults)};
+    }
+    Result<World> world = World::build(std::move(file.definition));
+    if (!world) {
+        return {.world = nullptr,
+                .faults = {{.file = std::string(name),
+                            .line = file.terrain_line,
+                            .column = file.terrain_column,
+                            .key = "terrain",
+                            .message = world.error().message}}};
+    }
+    return {.world = std::make_shared<const World>(std::move(*world)), .faults = {}};
+}
+
+}  // namespace terrane
