@@ -14,7 +14,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 namespace terrane {
 
@@ -38,19 +37,6 @@ void expand_column(std::span<Voxel> out, std::span<const Limit> column, const Pa
 
 /// Voxel `y` (0..height-1, from the chunk's floor) of the chunk's column (x, z).
 Voxel voxel_of(const Chunk& chunk, std::int32_t x, std::int32_t y, std::int32_t z);
-
-/// sRGB to linear light, the exact curve's values to float.
-LinearColor linear_from_srgb(Rgb8 color);
-
-/// Linear light to the nearest sRGB; values outside 0..1 are clamped.
-Rgb8 srgb_from_linear(LinearColor color);
-
-/// The mix of the materials' colours in linear light. `materials` is WorldDefinition::materials.
-LinearColor color_of(std::span<const Share> shares, std::span<const Material> materials);
-
-/// Colour of every palette entry, by position.
-std::vector<LinearColor> palette_colors(const Palette& palette,
-                                        std::span<const Material> materials);
 
 /// The colour at any height (1/256 voxel), given palette_colors: the mix that voxel_at would have
 /// there.
