@@ -7,10 +7,33 @@
 namespace terrane {
 
 inline constexpr std::uint32_t kProtocolVersion = 1;
-inline constexpr std::size_t kInboundFrameBytesMax = std::size_t{64} << 10U;   ///< client to server
-inline constexpr std::size_t kPayloadBytesMax = std::size_t{64} << 20U;        ///< server to client
+
+inline constexpr std::size_t kInboundFrameBytesMax = std::size_t{64} << 10U;  ///< client to server
+inline constexpr std::size_t kPayloadBytesMax = std::size_t{64} << 20U;       ///< server to client
+/// Heads from a server: the largest is a world file (1 MiB) with its table around it.
+inline constexpr std::size_t kOutboundHeadBytesMax = std::size_t{2} << 20U;
+/// What a COLUMNS payload may grow to when decompressed.
+inline constexpr std::size_t kColumnChunkBytesMax = std::size_t{64} << 20U;
+
 inline constexpr std::size_t kKeysPerRequestMax = 64;
 inline constexpr std::size_t kKeysInFlightPerSessionMax = 1024;
+inline constexpr std::size_t kRequestsPerCancelMax = 1024;
+
 inline constexpr std::size_t kNameBytesMax = 256;
+inline constexpr std::size_t kTokenBytesMax = 4096;
+inline constexpr std::size_t kTextBytesMax = 4096;  ///< a Failure's message, a Goodbye's reason
+inline constexpr std::size_t kWorldFileBytesMax = std::size_t{1} << 20U;
+inline constexpr std::int32_t kChunkSideMax = 64;  ///< columns or voxels
+inline constexpr std::size_t kFormatsMax = 16;
+inline constexpr std::size_t kWireMaterialsMax = 256;
+inline constexpr std::size_t kWireSharesMax = 16;
+inline constexpr std::size_t kWireLimitsMax = 65536;  ///< limits of one column
+inline constexpr std::uint32_t kRetryAfterMaxMs = 60'000;
+
+/// Most FlatBuffers tables in one head, and how deep they may nest. A client's messages have two.
+/// A column's limit costs two tables and one a share.
+inline constexpr std::uint32_t kInboundTablesMax = 16;
+inline constexpr std::uint32_t kOutboundTablesMax = 1U << 20U;
+inline constexpr std::uint32_t kTableDepthMax = 8;
 
 }  // namespace terrane

@@ -1,0 +1,52 @@
+#include "protocol/wire/messages.h"
+
+#include <array>
+
+namespace terrane {
+
+std::string_view to_string(ChunkFormat format) {
+    switch (format) {
+        case ChunkFormat::draco:
+            return "draco";
+        case ChunkFormat::columns:
+            return "columns";
+    }
+    return "unknown";
+}
+
+std::string_view to_string(ChunkStatus status) {
+    switch (status) {
+        case ChunkStatus::full:
+            return "full";
+        case ChunkStatus::empty:
+            return "empty";
+        case ChunkStatus::uniform:
+            return "uniform";
+        case ChunkStatus::not_modified:
+            return "not_modified";
+    }
+    return "unknown";
+}
+
+std::string_view to_string(ChunkSource source) {
+    switch (source) {
+        case ChunkSource::generated:
+            return "generated";
+        case ChunkSource::store:
+            return "store";
+        case ChunkSource::cache:
+            return "cache";
+    }
+    return "unknown";
+}
+
+std::string_view name_of(const AnyMessage& message) {
+    // In the order of AnyMessage.
+    constexpr std::array<std::string_view, std::variant_size_v<AnyMessage>> kNames = {
+        "ClientHello", "ServerHello", "ChunkRequest", "ChunkCancel",     "Chunk",
+        "ColumnQuery", "Column",      "WorldQuery",   "WorldDefinition", "Failure",
+        "Ping",        "Pong",        "Goodbye"};
+    return kNames[message.index()];
+}
+
+}  // namespace terrane

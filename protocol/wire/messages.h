@@ -1,0 +1,226 @@
+// The messages of the native protocol as plain values, and their way to and from FlatBuffers.
+//
+// Whoever sends or receives works with these structs only. Reading validates at the edge: what
+// comes out has known enum values, finite numbers, counts and texts within limits.h. What a value
+// *means* (does this level exist, is this version ours) is the receiver's to judge. All functions:
+// any thread.
+#pragma once
+
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace terrane {
+
+enum class ChunkFormat : std::uint8_t { draco = 0, columns = 1 };
+enum class ChunkStatus : std::uint8_t { full = 0, empty = 1, uniform = 2, not_modified = 3 };
+enum class ChunkSource : std::uint8_t { generated = 0, store = 1, cache = 2 };
+
+/// As on the command line and in JSON, e.g. "draco", "not_modified", "generated".
+std::string_view to_string(ChunkFormat format);
+std::string_view to_string(ChunkStatus status);
+std::string_view to_string(ChunkSource source);
+
+/// What the server spent on an answer, microseconds each.
+struct AnswerTimings {
+    std::uint32_t queue_us = 0;
+    std::uint32_t generate_us = 0;
+    std::uint32_t mesh_us = 0;
+    std::uint32_t encode_us = 0;
+
+    friend bool operator==(const AnswerTimings&, const AnswerTimings&) = default;
+};
+
+/// `material` is an index into ServerHello::materials, `concentration` in [0, 1].
+struct WireShare {
+    std::uint16_t material = 0;
+    double concentration = 0;
+
+    friend bool operator==(const WireShare&, const WireShare&) = default;
+};
+
+/// Main material first; empty where a message has no composition.
+using WireComposition = std::vector<WireShare>;
+
+struct WireMaterial {
+    std::string name;
+    std::uint32_t color_rgb = 0;  ///< 0xRRGGBB, sRGB
+    std::string texture;          ///< file name, may be empty
+    bool solid = true;
+
+    friend bool operator==(const WireMaterial&, const WireMaterial&) = default;
+};
+
+/// What a server holds a session to.
+struct WireLimits {
+    std::uint32_t keys_per_request_max = 0;
+    std::uint32_t keys_in_flight_max = 0;
+    std::uint32_t inbound_frame_bytes_max = 0;
+    std::uint32_t payload_bytes_max = 0;
+
+    friend bool operator==(const WireLimits&, const WireLimits&) = default;
+};
+
+struct ClientHello {
+    std::uint32_t protocol_version = 0;
+    std::string client_name;  ///< no control characters: it goes to logs
+    std::string token;
+    std::vector<ChunkFormat> formats;  ///< formats this build doesn't know are left out when read
+
+    friend bool operator==(const ClientHello&, const ClientHello&) = default;
+};
+
+struct ServerHello {
+    std::uint32_t protocol_version = 0;
+    std::string server_version;
+    std::uint32_t generator_version = 0;
+    std::uint32_t encoding_version = 0;
+    std::string world_name;
+    Hash128 fingerprint;
+    Hash128 content_id;
+    std::int32_t chunk_side = 0;    ///< columns, 1..64
+    std::int32_t chunk_height = 0;  ///< voxels, 1..64
+    double voxel_size_m = 0;        ///< > 0
+    std::int32_t levels = 0;        ///< levels 0..levels-1 are served; >= 1
+    double height_bound_voxels = 0;
+    std::vector<WireMaterial> materials;
+    WireLimits limits;
+
+    friend bool operator==(const ServerHello&, const ServerHello&) = default;
+};
+
+struct ChunkRequest {
+    std::uint32_t request_id = 0;  ///< not 0
+    ChunkFormat format = ChunkFormat::draco;
+    std::vector<ChunkPos> keys;        ///< 1..kKeysPerRequestMax
+    std::vector<Hash128> known_etags;  ///< empty, or one a key; all zero means none
+    std::int32_t priority = 0;         ///< higher first
+    bool without_flow = false;
+
+    friend bool operator==(const ChunkRequest&, const ChunkRequest&) = default;
+};
+
+struct ChunkCancel {
+    std::vector<std::uint32_t> request_ids;  ///< 1..kRequestsPerCancelMax
+
+    friend bool operator==(const ChunkCancel&, const ChunkCancel&) = default;
+};
+
+/// The head of a Chunk answer. `payload_bytes` follow it in the frame: more than 0 if and only if
+/// the status is full.
+struct ChunkAnswer {
+    std::uint32_t request_id = 0;
+    ChunkPos key;
+    ChunkFormat format = ChunkFormat::draco;
+    ChunkStatus status = ChunkStatus::full;
+    ChunkSource source = ChunkSource::generated;
+    Hash128 etag;
+    AnswerTimings timings;
+    std::uint32_t payload_bytes = 0;
+    WireComposition uniform;  ///< of a uniform chunk
+
+    friend bool operator==(const ChunkAnswer&, const ChunkAnswer&) = default;
+};
+
+struct ColumnQuery {
+    std::uint32_t request_id = 0;  ///< not 0
+    ColumnPos column;              ///< |x|, |z| < kColumnCoordinateLimit
+
+    friend bool operator==(const ColumnQuery&, const ColumnQuery&) = default;
+};
+
+struct WireLimit {
+    std::int32_t y256 = 0;  ///< 1/256 voxel
+    std::int8_t flow_x = 0;
+    std::int8_t flow_y = 0;
+    std::int8_t flow_z = 0;
+    WireComposition composition;
+
+    friend bool operator==(const WireLimit&, const WireLimit&) = default;
+};
+
+struct ColumnAnswer {
+    std::uint32_t request_id = 0;
+    ColumnPos column;
+    std::vector<WireLimit> limits;  ///< bottom first
+
+    friend bool operator==(const ColumnAnswer&, const ColumnAnswer&) = default;
+};
+
+struct WorldQuery {
+    std::uint32_t request_id = 0;  ///< not 0
+
+    friend bool operator==(const WorldQuery&, const WorldQuery&) = default;
+};
+
+struct WorldAnswer {
+    std::uint32_t request_id = 0;
+    std::string toml;  ///< the canonical world file
+    Hash128 fingerprint;
+
+    friend bool operator==(const WorldAnswer&, const WorldAnswer&) = default;
+};
+
+/// request_id 0: the whole session. With a key: that key of the request; without: all of the
+/// request that is not answered yet.
+struct Failure {
+    std::uint32_t request_id = 0;
+    Error error{.code = ErrorCode::internal, .message = {}};
+    std::uint32_t retry_after_ms = 0;  ///< of a `busy`; at most kRetryAfterMaxMs
+    std::optional<ChunkPos> key;
+
+    friend bool operator==(const Failure&, const Failure&) = default;
+};
+
+struct Ping {
+    std::uint64_t nonce = 0;
+
+    friend bool operator==(const Ping&, const Ping&) = default;
+};
+
+struct Pong {
+    std::uint64_t nonce = 0;
+
+    friend bool operator==(const Pong&, const Pong&) = default;
+};
+
+/// The sender stops: with an error code, or none if all is well.
+struct Goodbye {
+    std::optional<ErrorCode> code;
+    std::string reason;
+
+    friend bool operator==(const Goodbye&, const Goodbye&) = default;
+};
+
+using AnyMessage =
+    std::variant<ClientHello, ServerHello, ChunkRequest, ChunkCancel, ChunkAnswer, ColumnQuery,
+                 ColumnAnswer, WorldQuery, WorldAnswer, Failure, Ping, Pong, Goodbye>;
+
+/// The schema's name of the message, e.g. "ChunkRequest": for logs and errors.
+std::string_view name_of(const AnyMessage& message);
+
+/// The message as the bytes `u32 length | head`. A ChunkAnswer's length counts its `payload_bytes`,
+/// which the caller sends right behind; every other message is whole. Texts above their limit are
+/// cut, lists above theirs are an assertion.
+Bytes encode_message(const AnyMessage& message);
+
+/// A verified frame as a value. `malformed` means that the peer doesn't speak the protocol: close
+/// the connection. Every other code is about this one message (an unknown format is `unsupported`,
+/// 0 or more than 64 keys `invalid_argument`, a far column `out_of_range`): answer it with a
+/// Failure of `request_id_of` and go on.
+Result<AnyMessage> decode_message(const Frame& frame);
+
+/// The request id in a frame's head, 0 if that kind of message has none: what a Failure about a
+/// message that did not decode refers to.
+std::uint32_t request_id_of(const Frame& frame);
+
+}  // namespace terrane

@@ -1,0 +1,215 @@
+#include "protocol/wire/messages.h"
+
+#include "tests/wire/sample_messages.h"
+
+#include <gtest/gtest.h>
+#include <terrane_generated.h>
+
+#include <limits>
+
+namespace terrane {
+namespace {
+
+Result<AnyMessage> decode(std::span<const std::byte> bytes) {
+    FrameReader reader(kOutboundFrameLimits);
+    reader.feed(bytes);
+    const auto frame = reader.next();
+    if (!frame) {
+        return tl::unexpected(frame.error());
+    }
+    if (!*frame) {
+        return fail(ErrorCode::internal, "no whole frame");
+    }
+    return decode_message(**frame);
+}
+
+/// Decodes a body built field by field with the generated code, for what our own encoder can't
+/// write.
+template <typename Build>
+Result<AnyMessage> decode_built(Build build) {
+    flatbuffers::FlatBufferBuilder builder;
+    const auto body = build(builder);
+    wire::FinishSizePrefixedMessageBuffer(builder,
+                                          wire::CreateMessage(builder, body.first, body.second));
+    return decode(
+        frame_head(std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())), 0));
+}
+
+ErrorCode code_of(const Result<AnyMessage>& message) {
+    return message ? static_cast<ErrorCode>(0) : message.error().code;
+}
+
+TEST(Messages, EveryKindSurvivesTheRoundTrip) {
+    for (const AnyMessage& message : sample_messages()) {
+        const auto decoded = decode(encode_message(message));
+        ASSERT_TRUE(decoded) << name_of(message) << ": " << decoded.error().message;
+        EXPECT_EQ(*decoded, message) << name_of(message);
+    }
+}
+
+TEST(Messages, SamplesCoverEveryKind) {
+    std::vector<bool> seen(std::variant_size_v<AnyMessage>);
+    for (const AnyMessage& message : sample_messages()) {
+        seen[message.index()] = true;
+    }
+    EXPECT_EQ(std::ranges::count(seen, true), std::ssize(seen));
+}
+
+TEST(Messages, AFullChunkCountsItsPayload) {
+    const ChunkAnswer answer{.request_id = 1,
+                             .key = {},
+                             .format = ChunkFormat::draco,
+                             .status = ChunkStatus::full,
+                             .source = ChunkSource::store,
+                             .etag = {},
+                             .timings = {},
+                             .payload_bytes = 3,
+                             .uniform = {}};
+    Bytes bytes = encode_message(answer);
+    for (const int value : {1, 2, 3}) {
+        bytes.push_back(static_cast<std::byte>(value));
+    }
+    const auto decoded = decode(bytes);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(std::get<ChunkAnswer>(*decoded), answer);
+}
+
+TEST(Messages, APayloadThatTheHeadDoesNotAnnounceIsMalformed) {
+    Bytes bytes = encode_message(Ping{.nonce = 1});
+    bytes.push_back(std::byte{0});
+    bytes[0] = static_cast<std::byte>(static_cast<int>(bytes[0]) + 1);
+    EXPECT_EQ(code_of(decode(bytes)), ErrorCode::malformed);
+}
+
+TEST(Messages, RequestOfNoKeysIsInvalid) {
+    EXPECT_EQ(code_of(decode(encode_message(ChunkRequest{.request_id = 1,
+                                                         .format = {},
+                                                         .keys = {},
+                                                         .known_etags = {},
+                                                         .priority = 0,
+                                                         .without_flow = false}))),
+              ErrorCode::invalid_argument);
+}
+
+TEST(Messages, RequestOf64KeysIsReadAndOf65Refused) {
+    ChunkRequest request{.request_id = 1,
+                         .format = ChunkFormat::draco,
+                         .keys = std::vector<ChunkPos>(kKeysPerRequestMax),
+                         .known_etags = {},
+                         .priority = 0,
+                         .without_flow = false};
+    EXPECT_TRUE(decode(encode_message(request)));
+    request.keys.emplace_back();
+    EXPECT_EQ(code_of(decode(encode_message(request))), ErrorCode::invalid_argument);
+}
+
+TEST(Messages, EtagsMustBeAsManyAsKeys) {
+    ChunkRequest request{.request_id = 1,
+                         .format = ChunkFormat::draco,
+                         .keys = std::vector<ChunkPos>(2),
+                         .known_etags = std::vector<Hash128>(1),
+                         .priority = 0,
+                         .without_flow = false};
+    EXPECT_EQ(code_of(decode(encode_message(request))), ErrorCode::invalid_argument);
+}
+
+TEST(Messages, RequestIdZeroIsTheSession) {
+    EXPECT_EQ(code_of(decode(encode_message(WorldQuery{.request_id = 0}))),
+              ErrorCode::invalid_argument);
+    EXPECT_EQ(code_of(decode(encode_message(ColumnQuery{.request_id = 0, .column = {}}))),
+              ErrorCode::invalid_argument);
+}
+
+TEST(Messages, UnknownFormatIsUnsupported) {
+    const auto message = decode_built([](auto& builder) {
+        const std::vector<wire::ChunkKey> keys(1);
+        const auto keys_at = builder.CreateVectorOfStructs(keys);
+        const auto request =
+            wire::CreateChunkRequest(builder, 1, static_cast<wire::Format>(200), keys_at);
+        return std::pair(wire::Body::ChunkRequest, request.Union());
+    });
+    EXPECT_EQ(code_of(message), ErrorCode::unsupported);
+}
+
+TEST(Messages, FormatsOfANewerClientAreLeftOut) {
+    const auto message = decode_built([](auto& builder) {
+        const auto formats =
+            builder.CreateVector(std::vector{static_cast<wire::Format>(77), wire::Format::Columns});
+        return std::pair(wire::Body::ClientHello,
+                         wire::CreateClientHello(builder, 1, 0, 0, formats).Union());
+    });
+    ASSERT_TRUE(message) << message.error().message;
+    EXPECT_EQ(std::get<ClientHello>(*message).formats, std::vector{ChunkFormat::columns});
+}
+
+TEST(Messages, ColumnsFartherThan2To53AreOutOfRange) {
+    for (const std::int64_t far :
+         {kColumnCoordinateLimit, -kColumnCoordinateLimit, std::numeric_limits<std::int64_t>::min(),
+          std::numeric_limits<std::int64_t>::max()}) {
+        EXPECT_EQ(code_of(decode(
+                      encode_message(ColumnQuery{.request_id = 1, .column = {.x = far, .z = 0}}))),
+                  ErrorCode::out_of_range);
+        EXPECT_EQ(code_of(decode(
+                      encode_message(ColumnQuery{.request_id = 1, .column = {.x = 0, .z = far}}))),
+                  ErrorCode::out_of_range);
+    }
+}
+
+TEST(Messages, NumbersThatAreNotFiniteAreMalformed) {
+    for (const double value : {std::numeric_limits<double>::quiet_NaN(),
+                               std::numeric_limits<double>::infinity(), 0.0, -1.0}) {
+        auto hello = std::get<ServerHello>(sample_messages()[1]);
+        hello.voxel_size_m = value;
+        EXPECT_EQ(code_of(decode(encode_message(hello))), ErrorCode::malformed) << value;
+    }
+    auto answer = std::get<ChunkAnswer>(sample_messages()[4]);
+    answer.uniform[0].concentration = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(code_of(decode(encode_message(answer))), ErrorCode::malformed);
+}
+
+TEST(Messages, LongOrUnprintableClientNamesAreMalformed) {
+    for (const std::string& name : {std::string(kNameBytesMax + 1, 'a'), std::string("a\nb")}) {
+        const auto message = decode_built([&name](auto& builder) {
+            const auto name_at = builder.CreateString(name);
+            return std::pair(wire::Body::ClientHello,
+                             wire::CreateClientHello(builder, 1, name_at).Union());
+        });
+        EXPECT_EQ(code_of(message), ErrorCode::malformed);
+    }
+}
+
+TEST(Messages, LongTextsAreCutBetweenCharacters) {
+    std::string reason(kTextBytesMax - 1, 'a');
+    reason += "\u00e9";
+    const auto decoded = decode(encode_message(Goodbye{.code = std::nullopt, .reason = reason}));
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(std::get<Goodbye>(*decoded).reason, std::string(kTextBytesMax - 1, 'a'));
+}
+
+TEST(Messages, EmptyAndUnknownBodiesAreErrors) {
+    EXPECT_EQ(code_of(decode_built(
+                  [](auto&) { return std::pair(wire::Body::NONE, flatbuffers::Offset<void>()); })),
+              ErrorCode::malformed);
+    EXPECT_EQ(code_of(decode_built([](auto& builder) {
+                  return std::pair(static_cast<wire::Body>(99), wire::CreatePing(builder).Union());
+              })),
+              ErrorCode::unsupported);
+}
+
+TEST(Messages, RequestIdIsKnownEvenOfARefusedRequest) {
+    const Bytes bytes = encode_message(ChunkRequest{.request_id = 77,
+                                                    .format = {},
+                                                    .keys = {},
+                                                    .known_etags = {},
+                                                    .priority = 0,
+                                                    .without_flow = false});
+    FrameReader reader(kInboundFrameLimits);
+    reader.feed(bytes);
+    const auto frame = reader.next();
+    ASSERT_TRUE(frame && *frame);
+    EXPECT_FALSE(decode_message(**frame));
+    EXPECT_EQ(request_id_of(**frame), 77U);
+}
+
+}  // namespace
+}  // namespace terrane
