@@ -77,10 +77,14 @@ std::uint16_t pick(RandomStream& random, const Candidates& candidates) {
 
 MaterialKind main_kind(Filling filling) {
     switch (filling) {
-        case Filling::base: return MaterialKind::base;
-        case Filling::regular: return MaterialKind::regular;
-        case Filling::vein: return MaterialKind::vein;
-        case Filling::cave: break;
+        case Filling::base:
+            return MaterialKind::base;
+        case Filling::regular:
+            return MaterialKind::regular;
+        case Filling::vein:
+            return MaterialKind::vein;
+        case Filling::cave:
+            break;
     }
     return MaterialKind::cave;
 }
@@ -198,10 +202,8 @@ DrawnProperties draw_properties(RandomStream& random, const WorldDefinition& def
     DrawnProperties properties;
     for (const Share& share : composition.shares()) {
         const Material& material = definition.materials[share.material];
-        properties.thickness +=
-            share.concentration * triangular(material.thickness, random.unit());
-        properties.roughness +=
-            share.concentration * triangular(material.roughness, random.unit());
+        properties.thickness += share.concentration * triangular(material.thickness, random.unit());
+        properties.roughness += share.concentration * triangular(material.roughness, random.unit());
     }
     return properties;
 }

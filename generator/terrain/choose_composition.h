@@ -2,12 +2,12 @@
 // Source: the paper, 4.2.1, eq. 1 (affinity), eq. 2 (choice), eq. 3 (properties).
 #pragma once
 
-#include <cstdint>
-#include <optional>
-
 #include "generator/terrain/random.h"
 #include "generator/world/composition.h"
 #include "generator/world/world_definition.h"
+
+#include <cstdint>
+#include <optional>
 
 namespace terrane {
 

@@ -1,11 +1,11 @@
 #include "generator/terrain/layer_stack.h"
 
+#include "generator/terrain/choose_composition.h"
+#include "generator/terrain/random.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-
-#include "generator/terrain/choose_composition.h"
-#include "generator/terrain/random.h"
 
 namespace terrane {
 namespace {
@@ -14,17 +14,17 @@ Layer draw_layer(RandomStream& random, const WorldDefinition& definition,
                  const Composition& composition) {
     const TerrainParameters& terrain = definition.terrain;
     const DrawnProperties drawn = draw_properties(random, definition, composition);
-    const double similarity = mixed_property(definition, composition,
-                                             [](const Material& m) { return m.similarity; });
+    const double similarity =
+        mixed_property(definition, composition, [](const Material& m) { return m.similarity; });
     Layer layer;
     layer.composition = composition;
     layer.thickness = std::max(1.0, drawn.thickness * terrain.layer_thickness);
     layer.roughness = drawn.roughness * terrain.roughness;
     layer.similarity = std::clamp(similarity * terrain.layer_similarity, 0.0, 1.0);
     layer.alone = is_alone(definition, composition);
-    layer.blend = layer.alone ? 0
-                              : mixed_property(definition, composition,
-                                               [](const Material& m) { return m.blend; });
+    layer.blend = layer.alone ? 0 : mixed_property(definition, composition, [](const Material& m) {
+        return m.blend;
+    });
     return layer;
 }
 
@@ -55,10 +55,12 @@ double tallest_element(const LayerStack& stack, const WorldDefinition& definitio
         const bool in_veins = material.kind == MaterialKind::vein ||
                               (material.kind == MaterialKind::regular && !material.alone);
         if (in_veins && stack.reference_veins > 0) {
-            tallest = std::max(tallest, material.thickness.most * definition.terrain.vein_thickness);
+            tallest =
+                std::max(tallest, material.thickness.most * definition.terrain.vein_thickness);
         }
         if (material.kind == MaterialKind::cave && stack.reference_caves > 0) {
-            tallest = std::max(tallest, material.thickness.most * definition.terrain.cave_thickness);
+            tallest =
+                std::max(tallest, material.thickness.most * definition.terrain.cave_thickness);
         }
     }
     return tallest;
@@ -92,7 +94,8 @@ Result<LayerStack> build_layer_stack(const WorldDefinition& definition) {
                                previous, 1 - bottom / depth);
         if (!composition) {
             if (k == 0) {
-                return fail(ErrorCode::invalid_argument, "material: none of kind base to start from");
+                return fail(ErrorCode::invalid_argument,
+                            "material: none of kind base to start from");
             }
             stack.layers.back().thickness += depth - bottom;
             break;

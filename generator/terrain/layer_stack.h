@@ -1,12 +1,12 @@
 // The layer stack: the "existing terrain" of the paper (4.2.1, 4.2.4), fixed once per world.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "generator/world/composition.h"
 #include "generator/world/world_definition.h"
 #include "protocol/base/result.h"
+
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 
@@ -31,7 +31,7 @@ struct LayerStack {
     std::vector<std::int32_t> origin_caves;
     double reference_veins = 0;  ///< what later plots draw 0.5 to 1.5 times of
     double reference_caves = 0;
-    double height_bound = 0;     ///< nothing solid stands above, voxels
+    double height_bound = 0;  ///< nothing solid stands above, voxels
 
     std::int32_t gap_count() const { return static_cast<std::int32_t>(layers.size()) - 1; }
 };

@@ -1,5 +1,5 @@
-// Hashes and random streams: the only source of chance in Terrane. A value depends on what it is for
-// (a tag) and where it is, never on what was drawn before it elsewhere.
+// Hashes and random streams: the only source of chance in Terrane. A value depends on what it is
+// for (a tag) and where it is, never on what was drawn before it elsewhere.
 //
 // `mix` is the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
 // generators", 2014, with Stafford's constants); a stream is SplitMix64 itself.
@@ -10,7 +10,8 @@
 
 namespace terrane {
 
-/// What a hash is for. Two things never share a stream, so adding a draw to one never moves another.
+/// What a hash is for. Two things never share a stream, so adding a draw to one never moves
+/// another.
 enum class Tag : std::uint64_t { layer = 1, origin, plot, element, shape, noise, flow };
 
 constexpr std::uint64_t mix(std::uint64_t z) {

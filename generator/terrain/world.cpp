@@ -1,9 +1,9 @@
 #include "generator/terrain/world.h"
 
+#include "generator/world/world_file.h"
+
 #include <string>
 #include <utility>
-
-#include "generator/world/world_file.h"
 
 namespace terrane {
 
@@ -20,9 +20,8 @@ Result<World> World::build(WorldDefinition definition) {
     }
     World world;
     for (const Layer& layer : stack->layers) {
-        world.base_palette.push_back({.composition = layer.composition,
-                                      .kind = PaletteKind::layer,
-                                      .alone = layer.alone});
+        world.base_palette.push_back(
+            {.composition = layer.composition, .kind = PaletteKind::layer, .alone = layer.alone});
     }
     PaletteEntry nothing{.composition = {}, .kind = PaletteKind::void_, .alone = false};
     for (std::size_t i = 0; i < definition.materials.size(); ++i) {

@@ -1,11 +1,9 @@
-// A built world: the layer stack that everything extends, and the constants drawn once from the seed.
+// A built world: the layer stack that everything extends, and the constants drawn once from the
+// seed.
 //
 // Immutable after `build`; share it between threads as `std::shared_ptr<const World>` or by
 // reference.
 #pragma once
-
-#include <cstdint>
-#include <vector>
 
 #include "generator/terrain/layer_stack.h"
 #include "generator/world/composition.h"
@@ -14,18 +12,21 @@
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
 
+#include <cstdint>
+#include <vector>
+
 namespace terrane {
 
 struct World {
     WorldDefinition definition;
     LayerStack stack;
-    Palette base_palette;   ///< layers, then the void: what every stack's palette begins with
-    Hash128 fingerprint;    ///< names definition, textures and generator version
+    Palette base_palette;  ///< layers, then the void: what every stack's palette begins with
+    Hash128 fingerprint;   ///< names definition, textures and generator version
 
     std::uint16_t void_id() const { return static_cast<std::uint16_t>(stack.layers.size()); }
 
-    /// Fails with `invalid_argument` if the definition admits no first layer, or if its height bound
-    /// is above kHeightBoundMax.
+    /// Fails with `invalid_argument` if the definition admits no first layer, or if its height
+    /// bound is above kHeightBoundMax.
     static Result<World> build(WorldDefinition definition);
 };
 

@@ -1,0 +1,84 @@
+#include "generator/terrain/generate_stack.h"
+
+#include "generator/terrain/column_writer.h"
+#include "generator/terrain/kernels/kernel_choice.h"
+#include "generator/terrain/plot_cache.h"
+
+#include <string>
+#include <utility>
+
+namespace terrane {
+
+struct StackGenerator::Buffers {
+    explicit Buffers(const World& world) : constants(world), rules(world) {}
+
+    TerrainConstants constants;
+    ColumnRules rules;
+    PlotCache plots;
+    Region region;
+    std::vector<std::uint16_t> element_ids;
+};
+
+namespace {
+
+Result<void> check_range(const ColumnRectangle& rectangle) {
+    const auto inside = [](std::int64_t first, std::int32_t count) {
+        return first - 1 > -kColumnCoordinateLimit && first + count < kColumnCoordinateLimit;
+    };
+    if (!inside(rectangle.x0, rectangle.width) || !inside(rectangle.z0, rectangle.length)) {
+        return fail(ErrorCode::out_of_range, "column (" + std::to_string(rectangle.x0) + ", " +
+                                                 std::to_string(rectangle.z0) +
+                                                 ") is beyond the world's edge at 2^53");
+    }
+    return {};
+}
+
+}  // namespace
+
+StackGenerator::StackGenerator(const World& world) : StackGenerator(world, chosen_row_kernels()) {}
+
+StackGenerator::StackGenerator(const World& world, const RowKernels& kernels)
+    : world_(&world), kernels_(&kernels), buffers_(std::make_unique<Buffers>(world)) {}
+
+StackGenerator::~StackGenerator() = default;
+StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
+StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
+
+Result<void> StackGenerator::generate(Stack& out, StackPos position) {
+    if (position.lod != 0) {
+        return fail(ErrorCode::unsupported,
+                    "level of detail " + std::to_string(position.lod) + ": only 0 is served");
+    }
+    const std::int32_t side = world_->definition.grid.side;
+    const ColumnPos first = first_column_of(position, side);
+    const ColumnRectangle rectangle{.x0 = first.x, .z0 = first.z, .width = side, .length = side};
+    if (auto checked = check_range(rectangle); !checked) {
+        return checked;
+    }
+    build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
+                 *kernels_);
+    out.position = position;
+    out.side = side;
+    write_columns({.grid = out.columns,
+                   .palette = out.palette,
+                   .highest_y256 = out.highest_y256,
+                   .element_ids = buffers_->element_ids},
+                  buffers_->region, *world_, buffers_->rules, 1);
+    return {};
+}
+
+Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rectangle) {
+    if (auto checked = check_range(rectangle); !checked) {
+        return checked;
+    }
+    build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
+                 *kernels_);
+    write_columns({.grid = out.columns,
+                   .palette = out.palette,
+                   .highest_y256 = out.highest_y256,
+                   .element_ids = buffers_->element_ids},
+                  buffers_->region, *world_, buffers_->rules, 0);
+    return {};
+}
+
+}  // namespace terrane

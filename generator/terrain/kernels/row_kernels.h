@@ -1,0 +1,97 @@
+// The inner loops, compiled once per instruction set and chosen at run time.
+//
+// Every set gives the same bits: only + - * / sqrt, comparison and conversions, no contraction, and
+// no sum whose order depends on the vector width. The environment variable TERRANE_SIMD
+// (scalar, sse2, avx2, avx512; elsewhere scalar, native) forces a set; tests hash them all.
+//
+// This header is also included by code compiled for newer processors than the one at hand, so it
+// holds plain data and declarations only.
+#pragma once
+
+#include <cstdint>
+
+namespace terrane {
+
+/// Kernels work in blocks of this many columns and may write so many values past a row's end.
+inline constexpr std::int32_t kVectorPad = 16;
+/// Widest rectangle: a 64-column stack and its aprons, and the paper's 50-column plots, fit.
+inline constexpr std::int32_t kRectangleSideMax = 128;
+
+constexpr std::int32_t padded_width(std::int32_t width) {
+    return (width + kVectorPad - 1) / kVectorPad * kVectorPad;
+}
+
+/// One octave of noise over a rectangle, prepared: positions split into lattice cell and fraction.
+struct NoiseRows {
+    const float* fraction_x = nullptr;          ///< per column, padded
+    const float* fade_x = nullptr;              ///< per column, padded
+    const std::int32_t* column_cell = nullptr;  ///< per column, padded: lattice cell, from 0
+    const std::int32_t* cell_begin = nullptr;   ///< cell_count + 1: first column of each cell
+    const float* fraction_z = nullptr;          ///< per row
+    const std::int32_t* row_cell = nullptr;     ///< per row: lattice row, from 0
+    const float* gradient_x = nullptr;          ///< (rows + 1) x (cell_count + 1)
+    const float* gradient_z = nullptr;
+    std::int32_t cell_count = 0;
+    float amplitude = 0;
+    bool wide_cells = false;  ///< cells are wide enough to go cell by cell
+};
+
+/// A layer's constants in eq. 4.
+struct HeightConstants {
+    float below = 0;       ///< N0
+    float similarity = 0;  ///< s
+    float roughness = 0;   ///< r
+    float top = 0;         ///< A
+};
+
+/// The polygon of an element as 128 segments; see element_shape.h.
+struct SegmentTable {
+    const float* ax = nullptr;
+    const float* az = nullptr;
+    const float* ex = nullptr;  ///< B - A
+    const float* ez = nullptr;
+    const float* inverse_square = nullptr;  ///< 1 / |e|^2, or 0
+    std::int32_t count = 0;
+};
+
+struct RowKernels {
+    /// out[row * stride + column], padded rows: sum of the octaves, in order, from 0.
+    void (*noise)(float* out, std::int32_t stride, std::int32_t width, std::int32_t length,
+                  const NoiseRows* octaves, std::int32_t octave_count);
+    /// Eq. 4 over `count` values (a multiple of kVectorPad): height = max(S, ((S-N0)*s + n*r) + A);
+    /// S = height.
+    void (*heights)(float* height, float* stacked, const float* noise, std::int32_t count,
+                    HeightConstants constants);
+    /// packed[i] = x | y << 8 | z << 16 of a row's flow; `height` points at the row's first column
+    /// and its neighbours lie at -1, +1, -stride and +stride. `count` is a multiple of kVectorPad.
+    void (*flow)(std::int32_t* packed, const float* noise, const float* height, std::int32_t stride,
+                 std::int32_t count);
+    /// y256[i] = the height in 1/256 voxel.
+    void (*quantise)(std::int32_t* y256, const float* height, std::int32_t count);
+    /// thickness[i] of an element over the columns x_first + i of row z; `count` columns, written
+    /// in whole blocks.
+    void (*element_row)(float* thickness, float x_first, float z, std::int32_t count,
+                        const SegmentTable& segments, float inverse_half_side, float thick);
+};
+
+namespace kernels_scalar {
+extern const RowKernels kKernels;
+}
+
+namespace kernels_sse2 {
+extern const RowKernels kKernels;
+}
+
+namespace kernels_avx2 {
+extern const RowKernels kKernels;
+}
+
+namespace kernels_avx512 {
+extern const RowKernels kKernels;
+}
+
+namespace kernels_native {
+extern const RowKernels kKernels;
+}
+
+}  // namespace terrane

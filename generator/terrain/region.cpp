@@ -1,0 +1,208 @@
+#include "generator/terrain/region.h"
+
+#include "generator/terrain/random.h"
+#include "protocol/base/check.h"
+#include "protocol/base/coords.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace terrane {
+namespace {
+
+template <typename T>
+void grow(std::vector<T>& buffer, std::size_t size) {
+    if (buffer.size() < size) {
+        buffer.resize(size);
+    }
+}
+
+/// Where an element's square meets the region, in the region's rasters; nothing if nowhere.
+std::optional<PlacedElement> place(const PlottedElement& plotted, const RectangleShape& shape,
+                                   std::int32_t plot_side) {
+    const Element& element = plotted.element;
+    const std::int64_t x = element.plot.x * plot_side - shape.x0;
+    const std::int64_t z = element.plot.z * plot_side - shape.z0;
+    const float half = element.side * 0.5F + 1.0F;  // a column of slack for float rounding
+    const auto clamped = [](std::int64_t value, std::int32_t most) {
+        return static_cast<std::int32_t>(std::clamp<std::int64_t>(value, 0, most));
+    };
+    PlacedElement placed;
+    placed.plotted = &plotted;
+    placed.column_first =
+        clamped(x + static_cast<std::int64_t>(std::floor(element.center_x - half)), shape.width);
+    placed.row_first =
+        clamped(z + static_cast<std::int64_t>(std::floor(element.center_z - half)), shape.length);
+    placed.columns = clamped(x + static_cast<std::int64_t>(std::ceil(element.center_x + half)) + 1,
+                             shape.width) -
+                     placed.column_first;
+    placed.rows = clamped(z + static_cast<std::int64_t>(std::ceil(element.center_z + half)) + 1,
+                          shape.length) -
+                  placed.row_first;
+    if (placed.columns <= 0 || placed.rows <= 0) {
+        return std::nullopt;
+    }
+    placed.stride = padded_width(placed.columns) + kVectorPad;
+    return placed;
+}
+
+/// Every element of every plot near enough, rastered; in laying order.
+void find_elements(Region& region, const World& world, PlotCache& plots,
+                   const RowKernels& kernels) {
+    region.elements.clear();
+    region.gap_begin.assign(world.stack.layers.size(), 0);
+    if (world.stack.gap_count() == 0) {
+        return;
+    }
+    const TerrainParameters& terrain = world.definition.terrain;
+    const std::int32_t side = world.definition.grid.plot;
+    const auto reach =
+        static_cast<std::int64_t>(std::max(terrain.vein_area, terrain.cave_area) / 2) + 2;
+    const RectangleShape& shape = region.shape;
+    const PlotPos first{.x = floor_div(shape.x0 - reach, side),
+                        .z = floor_div(shape.z0 - reach, side)};
+    const PlotPos last{.x = floor_div(shape.x0 + shape.width - 1 + reach, side),
+                       .z = floor_div(shape.z0 + shape.length - 1 + reach, side)};
+    for (std::int64_t pz = first.z; pz <= last.z; ++pz) {
+        for (std::int64_t px = first.x; px <= last.x; ++px) {
+            for (PlottedElement& plotted : plots.get(world, {.x = px, .z = pz})) {
+                const auto placed = place(plotted, shape, side);
+                if (!placed || plotted.element.side <= 0) {
+                    continue;
+                }
+                if (!plotted.shape) {
+                    plotted.shape = make_shape(plotted.element);
+                }
+                region.elements.push_back(*placed);
+            }
+        }
+    }
+    std::sort(region.elements.begin(), region.elements.end(),
+              [](const PlacedElement& a, const PlacedElement& b) {
+                  return comes_before(a.element(), b.element());
+              });
+    std::size_t values = 0;
+    for (PlacedElement& placed : region.elements) {
+        placed.raster = values;
+        values += static_cast<std::size_t>(placed.stride) * static_cast<std::size_t>(placed.rows);
+    }
+    grow(region.thickness, values);
+    for (const PlacedElement& placed : region.elements) {
+        const Element& element = placed.element();
+        raster_element(region.thickness.data() + placed.raster, placed.stride, element,
+                       *placed.plotted->shape,
+                       {.x0 = shape.x0 + placed.column_first - element.plot.x * side,
+                        .z0 = shape.z0 + placed.row_first - element.plot.z * side,
+                        .width = placed.columns,
+                        .length = placed.rows},
+                       kernels, region.raster_buffers);
+    }
+    std::size_t next = 0;
+    for (std::size_t gap = 0; gap < region.gap_begin.size(); ++gap) {
+        while (next < region.elements.size() &&
+               static_cast<std::size_t>(region.elements[next].element().gap) < gap) {
+            ++next;
+        }
+        region.gap_begin[gap] = static_cast<std::uint32_t>(next);
+    }
+}
+
+/// Raises S by an element that stands on layer heights `height`, and marks its columns.
+void lay_element(Region& region, const PlacedElement& placed, const float* height) {
+    for (std::int32_t row = 0; row < placed.rows; ++row) {
+        const auto first = static_cast<std::size_t>(
+            (placed.row_first + row) * region.shape.stride() + placed.column_first);
+        const float* const thickness =
+            region.thickness.data() + placed.raster +
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(placed.stride);
+        for (std::size_t i = 0; i < static_cast<std::size_t>(placed.columns); ++i) {
+            if (thickness[i] > 0) {
+                region.has_element[first + i] = 1;
+                region.stacked[first + i] =
+                    std::max(region.stacked[first + i], height[first + i] + thickness[i]);
+            }
+        }
+    }
+}
+
+void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,
+                const RowKernels& kernels) {
+    const RectangleShape inner{.x0 = region.inner.x0,
+                               .z0 = region.inner.z0,
+                               .width = region.inner.width,
+                               .length = region.inner.length};
+    noise_rectangle(region.noise.data(), constants.flow_noise[layer], inner, kernels,
+                    region.noise_buffers);
+    const std::int32_t stride = region.shape.stride();
+    const float* const heights = region.heights.data() + layer * region.plane_size();
+    std::int32_t* const flow = region.flow.data() + layer * region.flow_plane_size();
+    for (std::int32_t row = 0; row < inner.length; ++row) {
+        kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+                     region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+                     heights + static_cast<std::ptrdiff_t>(row + 1) * stride + 1, stride,
+                     region.flow_stride);
+    }
+}
+
+void allocate(Region& region, std::size_t layers) {
+    const std::size_t plane = region.plane_size();
+    grow(region.stacked, plane);
+    // Flow of the last columns reads a little past the last plane's end.
+    grow(region.noise, plane);
+    grow(region.heights, plane * layers + 2 * kVectorPad);
+    grow(region.y256, plane * layers);
+    grow(region.flow, region.flow_plane_size() * layers);
+    region.has_element.assign(plane, 0);
+}
+
+}  // namespace
+
+TerrainConstants::TerrainConstants(const World& world) {
+    const TerrainParameters& terrain = world.definition.terrain;
+    const std::uint64_t seed = world.definition.seed;
+    for (std::size_t k = 0; k < world.stack.layers.size(); ++k) {
+        const Layer& layer = world.stack.layers[k];
+        height_noise.push_back(
+            Noise::make(key(seed, Tag::noise, k), terrain.scale, terrain.octaves));
+        flow_noise.push_back(Noise::make(key(seed, Tag::flow, k), 2 * terrain.scale, 1));
+        heights.push_back(
+            {.below = static_cast<float>(layer.bottom),
+             .similarity = static_cast<float>(layer.similarity),
+             .roughness = static_cast<float>(layer.roughness * (1 - layer.similarity)),
+             .top = static_cast<float>(layer.top())});
+    }
+}
+
+void build_region(Region& region, const World& world, const TerrainConstants& constants,
+                  const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels) {
+    TERRANE_ASSERT(rectangle.width >= 1 && rectangle.width <= kRectangleSideMax - 2 &&
+                   rectangle.length >= 1 && rectangle.length <= kRectangleSideMax - 2);
+    const std::size_t layers = world.stack.layers.size();
+    region.inner = rectangle;
+    region.shape = {.x0 = rectangle.x0 - 1,
+                    .z0 = rectangle.z0 - 1,
+                    .width = rectangle.width + 2,
+                    .length = rectangle.length + 2};
+    region.flow_stride = padded_width(rectangle.width);
+    allocate(region, layers);
+    plots.trim();
+    find_elements(region, world, plots, kernels);
+    const std::size_t plane = region.plane_size();
+    std::fill_n(region.stacked.begin(), plane, 1.0F);  // the base is never thinner than a voxel
+    const auto values = static_cast<std::int32_t>(plane);
+    for (std::size_t k = 0; k < layers; ++k) {
+        noise_rectangle(region.noise.data(), constants.height_noise[k], region.shape, kernels,
+                        region.noise_buffers);
+        float* const heights = region.heights.data() + k * plane;
+        kernels.heights(heights, region.stacked.data(), region.noise.data(), values,
+                        constants.heights[k]);
+        kernels.quantise(region.y256.data() + k * plane, heights, values);
+        const std::size_t end = k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
+        for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
+            lay_element(region, region.elements[e], heights);
+        }
+        build_flow(region, constants, k, kernels);
+    }
+}
+
+}  // namespace terrane

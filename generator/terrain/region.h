@@ -1,0 +1,78 @@
+// One rectangle of columns, start to end: noise, heights, elements and flow as rasters.
+//
+// Rasters have one value a column, an apron of one column around the rectangle included (flow needs
+// the slope, meshes the neighbours). Every value is a function of (world, column) only.
+#pragma once
+
+#include "generator/terrain/element.h"
+#include "generator/terrain/element_shape.h"
+#include "generator/terrain/noise.h"
+#include "generator/terrain/plot_cache.h"
+#include "generator/terrain/world.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+/// Columns x0 <= x < x0 + width, z0 <= z < z0 + length. Sides 1..kRectangleSideMax - 2.
+struct ColumnRectangle {
+    std::int64_t x0 = 0;
+    std::int64_t z0 = 0;
+    std::int32_t width = 0;
+    std::int32_t length = 0;
+};
+
+/// An element that stands in the region, with its raster over the columns it may cover.
+struct PlacedElement {
+    const PlottedElement* plotted = nullptr;  ///< owned by the plot cache
+    std::int32_t column_first = 0;            ///< raster's place in the region's rasters
+    std::int32_t row_first = 0;
+    std::int32_t columns = 0;
+    std::int32_t rows = 0;
+    std::int32_t stride = 0;
+    std::size_t raster = 0;  ///< index into Region::thickness
+
+    const Element& element() const { return plotted->element; }
+};
+
+/// A worker's rasters and buffers; refilled by build_region.
+struct Region {
+    ColumnRectangle inner;
+    RectangleShape shape;  ///< inner and its apron of one
+    std::int32_t flow_stride = 0;
+    std::vector<float> stacked;  ///< S, the top of the stack so far
+    std::vector<float> noise;
+    std::vector<float> heights;             ///< K planes of shape.padded_size(): H_k
+    std::vector<std::int32_t> y256;         ///< K planes, likewise: H_k in 1/256 voxel
+    std::vector<std::int32_t> flow;         ///< K planes of the inner columns: x | y << 8 | z << 16
+    std::vector<PlacedElement> elements;    ///< by gap, then in laying order
+    std::vector<std::uint32_t> gap_begin;   ///< first element of each gap; K entries
+    std::vector<float> thickness;           ///< the elements' rasters
+    std::vector<std::uint8_t> has_element;  ///< per column of shape: any element touches it
+
+    NoiseBuffers noise_buffers;
+    RasterBuffers raster_buffers;
+
+    std::size_t plane_size() const { return shape.padded_size(); }
+
+    std::size_t flow_plane_size() const {
+        return static_cast<std::size_t>(flow_stride) * static_cast<std::size_t>(inner.length) +
+               kVectorPad;
+    }
+};
+
+/// Noises and constants of a world's layers, made once per generator.
+struct TerrainConstants {
+    std::vector<Noise> height_noise;
+    std::vector<Noise> flow_noise;
+    std::vector<HeightConstants> heights;
+
+    explicit TerrainConstants(const World& world);
+};
+
+/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results.
+void build_region(Region& region, const World& world, const TerrainConstants& constants,
+                  const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels);
+
+}  // namespace terrane
