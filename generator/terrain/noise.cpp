@@ -171,7 +171,7 @@ NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const Rectan
 }  // namespace
 
 Noise Noise::make(std::uint64_t noise_key, double period, std::int32_t octaves) {
-    TERRANE_ASSERT(octaves >= 1 && octaves <= kOctavesMax && period >= 2);
+    TERRANE_ASSERT(octaves >= 1 && octaves <= kNoiseOctavesMax && period >= 2);
     double sum = 0;
     double amplitude = 1;
     for (std::int32_t o = 0; o < octaves; ++o) {
@@ -207,7 +207,7 @@ void noise_rectangle(float* out, const Noise& noise, const RectangleShape& shape
     TERRANE_ASSERT(shape.width >= 1 && shape.width <= kRectangleSideMax && shape.length >= 1 &&
                    shape.length <= kRectangleSideMax);
     Pieces pieces(buffers, shape, noise.octave_count);
-    std::array<NoiseRows, kOctavesMax> rows;
+    std::array<NoiseRows, kNoiseOctavesMax> rows;
     for (std::size_t o = 0; o < static_cast<std::size_t>(noise.octave_count); ++o) {
         rows[o] = prepare_octave(pieces, noise.octaves[o], shape);
     }

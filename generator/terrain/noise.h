@@ -16,7 +16,7 @@
 
 namespace terrane {
 
-inline constexpr std::int32_t kOctavesMax = 6;
+inline constexpr std::int32_t kNoiseOctavesMax = 6;
 
 /// One octave's constants.
 struct NoiseOctave {
@@ -30,7 +30,7 @@ struct NoiseOctave {
 
 /// |noise| <= 1. Octaves whose period is under 2 voxels are dropped.
 struct Noise {
-    std::array<NoiseOctave, kOctavesMax> octaves{};
+    std::array<NoiseOctave, kNoiseOctavesMax> octaves{};
     std::int32_t octave_count = 0;
 
     /// `period` >= 2 voxels of the first octave; it halves from octave to octave. 1..6 octaves.

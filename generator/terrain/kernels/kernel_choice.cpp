@@ -42,9 +42,9 @@ Result<KernelSet> kernel_set_from_environment() {
         if (set.name == wanted) {
             return set;
         }
-        names += (names.empty() ? "" : ", ") + std::string(set.name);
+        names.append(names.empty() ? "" : ", ").append(set.name);
     }
-    return fail(ErrorCode::invalid_argument, "TERRANE_SIMD=" + std::string(wanted) +
+    return fail(ErrorCode::invalid_argument, std::string("TERRANE_SIMD=").append(wanted) +
                                                  ": not known here; this processor has " + names);
 }
 
