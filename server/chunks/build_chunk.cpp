@@ -1,0 +1,275 @@
+#include "server/chunks/build_chunk.h"
+
+#include "generator/mesh/draco_codec.h"
+#include "generator/volume/chunk_codec.h"
+#include "protocol/base/check.h"
+#include "protocol/wire/column_payload.h"
+#include "protocol/wire/limits.h"
+#include "server/chunks/chunk_record.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace terrane {
+
+namespace {
+
+/// Times one stage after another.
+class StageClock {
+  public:
+    std::uint32_t lap_us() {
+        const auto now = std::chrono::steady_clock::now();
+        const auto us = std::chrono::duration_cast<std::chrono::microseconds>(now - last_).count();
+        last_ = now;
+        return static_cast<std::uint32_t>(
+            std::min<std::int64_t>(us, std::numeric_limits<std::uint32_t>::max()));
+    }
+
+  private:
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+tl::unexpected<Error> stopped() {
+    return fail(ErrorCode::cancelled, "nobody waits for it any more");
+}
+
+/// No surface can be there: below the base, or above the highest world that is allowed.
+bool beyond_every_surface(std::int32_t y, std::int32_t height) {
+    return y < 0 || static_cast<std::int64_t>(y) * height > kHeightBoundMax + 1;
+}
+
+void clear_flow(Chunk& chunk) {
+    for (Limit& limit : chunk.columns.limits) {
+        limit.flow = {};
+    }
+}
+
+}  // namespace
+
+Hash128 content_id_of(const World& world) {
+    Bytes bytes;
+    ByteWriter out(bytes);
+    out.fixed(world.fingerprint.high);
+    out.fixed(world.fingerprint.low);
+    out.fixed(kEncodingVersion);
+    return hash128(bytes);
+}
+
+ChunkBuilder::ChunkBuilder(const BuildContext& context)
+    : context_(context), generator_(*context.world), mesher_(context.world->definition) {}
+
+Result<Answer> ChunkBuilder::build(const Task& task) {
+    if (const auto* chunk = std::get_if<ChunkKey>(&task.key)) {
+        return build_chunk(task, *chunk);
+    }
+    return build_column(task, std::get<ColumnPos>(task.key));
+}
+
+Result<Answer> ChunkBuilder::build_chunk(const Task& task, const ChunkKey& key) {
+    ServedChunk answer{.key = key, .chunk = nullptr, .source = ChunkSource::store, .timings = {}};
+    const bool is_mesh = key.format == ChunkFormat::draco;
+    if (is_mesh) {
+        if (auto known = stored_mesh(key)) {
+            answer.chunk = std::move(known);
+            return answer;
+        }
+    }
+    StageClock clock;
+    const auto in_hand = stack_for(task, stack_of(key.position));
+    if (!in_hand) {
+        return tl::unexpected(in_hand.error());
+    }
+    answer.timings.generate_us = clock.lap_us();
+    answer.source = in_hand->generated ? ChunkSource::generated : ChunkSource::store;
+    if (task.stop.stop_requested()) {
+        return stopped();
+    }
+    auto encoded = is_mesh ? encode_mesh(task, key, *in_hand->stack, answer.timings)
+                           : encode_columns(key, *in_hand->stack, answer.timings);
+    if (!encoded) {
+        return tl::unexpected(encoded.error());
+    }
+    encoded->etag = etag_of(*encoded);
+    answer.chunk = std::make_shared<const EncodedChunk>(*std::move(encoded));
+    if (is_mesh) {
+        write_record({.family = Family::meshes,
+                      .format = static_cast<std::uint8_t>(key.format),
+                      .position = key.position},
+                     encode_chunk_record(*answer.chunk));
+    }
+    return answer;
+}
+
+Result<Answer> ChunkBuilder::build_column(const Task& task, ColumnPos column) {
+    const std::int32_t side = context_.world->definition.grid.side;
+    const auto in_hand = stack_for(task, stack_of(column, side));
+    if (!in_hand) {
+        return tl::unexpected(in_hand.error());
+    }
+    const Stack& stack = *in_hand->stack;
+    auto limits = std::make_shared<std::vector<ColumnLimit>>();
+    const auto x = static_cast<std::int32_t>(floor_mod(column.x, side));
+    const auto z = static_cast<std::int32_t>(floor_mod(column.z, side));
+    for (const Limit& limit : stack.columns.column(x, z)) {
+        limits->push_back({.y256 = limit.y256,
+                           .flow = limit.flow,
+                           .composition = stack.palette[limit.palette_id].composition});
+    }
+    return ServedColumn{.column = column, .limits = std::move(limits)};
+}
+
+Result<ChunkBuilder::StackInHand> ChunkBuilder::stack_for(const Task& task, StackPos position) {
+    if (auto known = context_.stacks->get(position)) {
+        raise(context_.counters->stack_hits);
+        const bool generated = generated_job_ == task.job && generated_position_ == position;
+        return StackInHand{.stack = std::move(known), .generated = generated};
+    }
+    auto stack = stored_stack(position);
+    const bool generated = stack == nullptr;
+    if (generated) {
+        if (task.stop.stop_requested()) {
+            return stopped();
+        }
+        if (const auto made = generator_.generate(stack_, position); !made) {
+            return tl::unexpected(made.error());
+        }
+        raise(context_.counters->generations);
+        generated_job_ = task.job;
+        generated_position_ = position;
+        stack = std::make_shared<const Stack>(stack_);  // a copy: exactly as large as it must be
+        encode_stack(bytes_, *stack);
+        write_record({.family = Family::stacks,
+                      .format = 0,
+                      .position = {.lod = position.lod, .x = position.x, .y = 0, .z = position.z}},
+                     bytes_);
+    }
+    context_.stacks->put(position, stack, memory_bytes(*stack));
+    return StackInHand{.stack = std::move(stack), .generated = generated};
+}
+
+std::shared_ptr<const Stack> ChunkBuilder::stored_stack(StackPos position) {
+    const RecordKey key{
+        .family = Family::stacks,
+        .format = 0,
+        .position = {.lod = position.lod, .x = position.x, .y = 0, .z = position.z}};
+    const auto bytes = read_record(key);
+    if (!bytes) {
+        return nullptr;
+    }
+    auto stack = decode_stack(*bytes);
+    if (stack &&
+        (stack->position != position || stack->side != context_.world->definition.grid.side)) {
+        stack = fail(ErrorCode::corrupt, "it is another stack's");
+    }
+    if (!stack) {
+        corrupt_record("stack", key, stack.error());
+        return nullptr;
+    }
+    raise(context_.counters->store_hits);
+    return std::make_shared<const Stack>(*std::move(stack));
+}
+
+std::shared_ptr<const EncodedChunk> ChunkBuilder::stored_mesh(const ChunkKey& chunk) {
+    const RecordKey key{.family = Family::meshes,
+                        .format = static_cast<std::uint8_t>(chunk.format),
+                        .position = chunk.position};
+    const auto bytes = read_record(key);
+    if (!bytes) {
+        return nullptr;
+    }
+    auto encoded = decode_chunk_record(*bytes, context_.world->definition.materials.size());
+    if (!encoded) {
+        corrupt_record("mesh", key, encoded.error());
+        return nullptr;
+    }
+    raise(context_.counters->store_hits);
+    return std::make_shared<const EncodedChunk>(*std::move(encoded));
+}
+
+Result<EncodedChunk> ChunkBuilder::encode_columns(const ChunkKey& key, const Stack& stack,
+                                                  AnswerTimings& timings) {
+    StageClock clock;
+    cut_chunk(chunk_, stack, key.position.y, context_.world->definition.grid.height);
+    EncodedChunk encoded;
+    if (chunk_.uniform) {
+        encoded.status = ChunkStatus::uniform;
+        encoded.uniform = chunk_.uniform_content.composition;
+    } else {
+        if (key.without_flow) {
+            clear_flow(chunk_);
+        }
+        encode_chunk(bytes_, chunk_);
+        encoded.status = ChunkStatus::full;
+        encoded.payload = std::make_shared<const Bytes>(encode_column_payload(bytes_));
+    }
+    timings.encode_us = clock.lap_us();
+    return encoded;
+}
+
+Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey& key,
+                                               const Stack& stack, AnswerTimings& timings) {
+    const Grid& grid = context_.world->definition.grid;
+    const std::int32_t y = key.position.y;
+    StageClock clock;
+    mesh_.clear();
+    if (!beyond_every_surface(y, grid.height)) {
+        mesher_.mesh(mesh_, stack, y, grid.height);
+    }
+    timings.mesh_us = clock.lap_us();
+    EncodedChunk encoded;
+    if (mesh_.triangle_count() == 0) {
+        cut_chunk(chunk_, stack, y, grid.height);
+        encoded.status = chunk_.uniform ? ChunkStatus::uniform : ChunkStatus::empty;
+        if (chunk_.uniform) {
+            encoded.uniform = chunk_.uniform_content.composition;
+        }
+        timings.encode_us = clock.lap_us();
+        return encoded;
+    }
+    if (task.stop.stop_requested()) {
+        return stopped();
+    }
+    auto payload = encode_draco(mesh_, {.side = grid.side, .height_voxels = grid.height + 1});
+    if (!payload) {
+        return tl::unexpected(payload.error());
+    }
+    if (payload->size() > kPayloadBytesMax) {
+        return fail(ErrorCode::too_large, "mesh of " + std::to_string(payload->size()) + " bytes");
+    }
+    encoded.status = ChunkStatus::full;
+    encoded.payload = std::make_shared<const Bytes>(*std::move(payload));
+    timings.encode_us = clock.lap_us();
+    return encoded;
+}
+
+std::optional<Bytes> ChunkBuilder::read_record(const RecordKey& key) {
+    auto found = context_.store->get(key);
+    if (!found) {
+        raise(context_.counters->store_failures);
+        return std::nullopt;
+    }
+    return *std::move(found);
+}
+
+void ChunkBuilder::write_record(const RecordKey& key, std::span<const std::byte> value) {
+    const RecordToPut record{.key = key, .value = value};
+    if (!context_.store->put(std::span(&record, 1))) {
+        raise(context_.counters->store_failures);
+    }
+}
+
+void ChunkBuilder::corrupt_record(std::string_view what, const RecordKey& key, const Error& error) {
+    raise(context_.counters->store_corrupt);
+    if (context_.on_notice) {
+        const ChunkPos at = key.position;
+        context_.on_notice("the store's record of " + std::string(what) + " " +
+                           std::to_string(at.lod) + "/" + std::to_string(at.x) + "/" +
+                           std::to_string(at.y) + "/" + std::to_string(at.z) +
+                           " can't be read and is made anew: " + error.message);
+    }
+}
+
+}  // namespace terrane

@@ -1,0 +1,321 @@
+// The service's decisions, with a build step that the test lets through one task at a time.
+#include "server/chunks/chunk_service.h"
+
+#include <gtest/gtest.h>
+
+#include <latch>
+#include <semaphore>
+#include <stdexcept>
+#include <thread>
+
+namespace terrane {
+namespace {
+
+/// A build step that tells when it has begun and waits to be let through.
+struct Gate {
+    std::counting_semaphore<> begun{0};
+    std::counting_semaphore<> passes{0};
+    std::atomic<int> builds{0};
+    std::atomic<bool> open{true};
+
+    std::function<BuildStep()> maker() {
+        return [this] {
+            return [this](const Task& task) -> Result<Answer> {
+                ++builds;
+                if (!open) {
+                    begun.release();
+                    passes.acquire();
+                }
+                if (task.stop.stop_requested()) {
+                    return fail(ErrorCode::cancelled, "stopped");
+                }
+                if (const auto* column = std::get_if<ColumnPos>(&task.key)) {
+                    return ServedColumn{.column = *column, .limits = nullptr};
+                }
+                const auto key = std::get<ChunkKey>(task.key);
+                if (key.position.y == 666) {
+                    throw std::runtime_error("thrown on purpose");
+                }
+                return ServedChunk{.key = key,
+                                   .chunk = std::make_shared<const EncodedChunk>(),
+                                   .source = ChunkSource::generated,
+                                   .timings = {}};
+            };
+        };
+    }
+};
+
+/// Collects answers; `wait` blocks until that many have come.
+class Inbox {
+  public:
+    AnswerCallback callback() {
+        return [this](const Result<Answer>& answer) {
+            const MutexLock lock(mutex_);
+            answers_.push_back(answer);
+            changed_.notify_all();
+        };
+    }
+
+    std::vector<Result<Answer>> wait(std::size_t count) {
+        MutexLock lock(mutex_);
+        while (answers_.size() < count) {
+            lock.wait(changed_);
+        }
+        return answers_;
+    }
+
+    std::size_t size() {
+        const MutexLock lock(mutex_);
+        return answers_.size();
+    }
+
+  private:
+    Mutex mutex_;
+    std::condition_variable_any changed_;
+    std::vector<Result<Answer>> answers_ TERRANE_GUARDED_BY(mutex_);
+};
+
+WorkKey chunk(std::int32_t x, std::int32_t y = 0) {
+    return ChunkKey{.position = {.lod = 0, .x = x, .y = y, .z = 0}};
+}
+
+struct Fixture {
+    explicit Fixture(ServiceOptions options = {}, bool open = true) : options_(options) {
+        gate.open = open;
+        service.emplace(options_, counters, gate.maker());
+    }
+
+    ~Fixture() {
+        gate.passes.release(10000);
+        service->stop();
+    }
+
+    Result<std::optional<Answer>> request(const WorkKey& key, std::int32_t priority = 0) {
+        last_id = service->new_waiter_id();
+        return service->request(key, priority, {.id = last_id, .answer = inbox.callback()});
+    }
+
+    const ServiceOptions options_;
+    Gate gate;
+    ServiceCounters counters;
+    Inbox inbox;
+    WaiterId last_id = 0;
+    std::optional<ChunkService> service;
+};
+
+TEST(ChunkService, AnswersByCallbackAndThenFromTheCache) {
+    Fixture f;
+    const auto first = f.request(chunk(1));
+    ASSERT_TRUE(first);
+    EXPECT_FALSE(*first);
+    const auto answers = f.inbox.wait(1);
+    ASSERT_TRUE(answers[0]);
+    EXPECT_EQ(std::get<ServedChunk>(*answers[0]).source, ChunkSource::generated);
+    const auto second = f.request(chunk(1));
+    ASSERT_TRUE(second && *second);
+    EXPECT_EQ(std::get<ServedChunk>(**second).source, ChunkSource::cache);
+    EXPECT_EQ(count_of(f.counters.cache_hits), 1U);
+    EXPECT_EQ(f.gate.builds, 1);
+}
+
+TEST(ChunkService, TwoHundredClientsOfOneColdChunkAreOneBuild) {
+    constexpr std::size_t kClients = 200;
+    Fixture f({.workers = 4}, false);
+    std::latch together(8);
+    {
+        std::vector<std::jthread> clients;
+        for (int i = 0; i < 8; ++i) {
+            clients.emplace_back([&] {
+                together.arrive_and_wait();
+                for (std::size_t k = 0; k < kClients / 8; ++k) {
+                    const auto id = f.service->new_waiter_id();
+                    const auto answer =
+                        f.service->request(chunk(7), 0, {.id = id, .answer = f.inbox.callback()});
+                    EXPECT_TRUE(answer);
+                }
+            });
+        }
+    }
+    f.gate.begun.acquire();
+    f.gate.passes.release();
+    for (const auto& answer : f.inbox.wait(kClients)) {
+        EXPECT_TRUE(answer);
+    }
+    EXPECT_EQ(f.gate.builds, 1);
+    EXPECT_EQ(count_of(f.counters.joins), kClients - 1);
+}
+
+TEST(ChunkService, FormatsOfOneChunkAreDifferentAnswers) {
+    Fixture f;
+    const ChunkPos at{.lod = 0, .x = 1, .y = 2, .z = 3};
+    ASSERT_TRUE(f.request(ChunkKey{.position = at, .format = ChunkFormat::draco}));
+    ASSERT_TRUE(f.request(ChunkKey{.position = at, .format = ChunkFormat::columns}));
+    ASSERT_TRUE(
+        f.request(ChunkKey{.position = at, .format = ChunkFormat::columns, .without_flow = true}));
+    f.inbox.wait(3);
+    EXPECT_EQ(f.gate.builds, 3);
+    const auto same =
+        f.request(ChunkKey{.position = at, .format = ChunkFormat::draco, .without_flow = true});
+    EXPECT_TRUE(same && *same) << "a mesh has no flow, so both are one";
+}
+
+TEST(ChunkService, TheLastToCancelStopsTheJob) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    const WaiterId first = f.last_id;
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    f.service->cancel(chunk(1), first);
+    EXPECT_EQ(count_of(f.counters.cancelled), 0U);
+    f.service->cancel(chunk(1), f.last_id);
+    EXPECT_EQ(count_of(f.counters.cancelled), 1U);
+    EXPECT_EQ(f.service->in_flight(), 0U);
+    ASSERT_TRUE(f.request(chunk(2)));
+    f.gate.passes.release(2);
+    const auto answers = f.inbox.wait(1);
+    EXPECT_EQ(std::get<ServedChunk>(*answers[0]).key, std::get<ChunkKey>(chunk(2)));
+}
+
+TEST(ChunkService, AJobCancelledInTheQueueIsNeverBuilt) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2)));
+    EXPECT_EQ(f.service->queued_jobs(), 1U);
+    f.service->cancel(chunk(2), f.last_id);
+    EXPECT_EQ(f.service->queued_jobs(), 0U);
+    ASSERT_TRUE(f.request(chunk(3)));
+    f.gate.passes.release(2);
+    f.inbox.wait(2);
+    EXPECT_EQ(f.gate.builds, 2);
+}
+
+TEST(ChunkService, ALateResultOfAStoppedJobDoesNotAnswerItsSuccessor) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    f.service->cancel(chunk(1), f.last_id);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.passes.release();  // the stopped one ends
+    f.gate.begun.acquire();   // its successor has begun
+    EXPECT_EQ(f.inbox.size(), 0U);
+    f.gate.passes.release();
+    EXPECT_TRUE(f.inbox.wait(1)[0]);
+    EXPECT_EQ(f.gate.builds, 2);
+}
+
+TEST(ChunkService, IsBusyWhenTheQueueIsFull) {
+    Fixture f({.queued_jobs_max = 2}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2)));
+    ASSERT_TRUE(f.request(chunk(3)));
+    const auto refused = f.request(chunk(4));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::busy);
+    EXPECT_GE(f.service->retry_after_ms(), 20U);
+    EXPECT_EQ(count_of(f.counters.busy), 1U);
+    EXPECT_TRUE(f.request(chunk(3))) << "joining needs no room in the queue";
+    f.gate.passes.release(3);
+    f.inbox.wait(4);
+    EXPECT_TRUE(f.request(chunk(4)));
+}
+
+TEST(ChunkService, IsBusyAtTheLimitsOfKeysAndWaiters) {
+    Fixture keys({.keys_in_flight_max = 2}, false);
+    ASSERT_TRUE(keys.request(chunk(1, 0)));
+    ASSERT_TRUE(keys.request(chunk(1, 1)));
+    EXPECT_EQ(keys.request(chunk(1, 2)).error().code, ErrorCode::busy);
+    Fixture waiters({.waiters_max = 2}, false);
+    ASSERT_TRUE(waiters.request(chunk(1)));
+    ASSERT_TRUE(waiters.request(chunk(1)));
+    EXPECT_EQ(waiters.request(chunk(1)).error().code, ErrorCode::busy);
+}
+
+TEST(ChunkService, ServesTheMoreUrgentFirst) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2), 0));
+    ASSERT_TRUE(f.request(chunk(3), 1));
+    ASSERT_TRUE(f.request(chunk(4), 0));
+    ASSERT_TRUE(f.request(chunk(4), 2));
+    f.gate.passes.release(4);
+    const auto answers = f.inbox.wait(5);
+    std::vector<std::int32_t> order;
+    for (const auto& answer : answers) {
+        order.push_back(std::get<ServedChunk>(*answer).key.position.x);
+    }
+    EXPECT_EQ(order, (std::vector<std::int32_t>{1, 4, 4, 3, 2}));
+}
+
+TEST(ChunkService, AStackWithManyWishesGivesWayToOthers) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1, 0)));
+    f.gate.begun.acquire();
+    for (std::int32_t y = 1; y < 100; ++y) {
+        ASSERT_TRUE(f.request(chunk(1, y)));
+    }
+    ASSERT_TRUE(f.request(chunk(2)));
+    f.gate.passes.release(101);
+    const auto answers = f.inbox.wait(101);
+    EXPECT_EQ(std::get<ServedChunk>(*answers[kTasksPerTurnMax]).key, std::get<ChunkKey>(chunk(2)));
+}
+
+TEST(ChunkService, AnExceptionFailsOneTaskOnly) {
+    Fixture f;
+    ASSERT_TRUE(f.request(chunk(1, 666)));
+    const auto answers = f.inbox.wait(1);
+    ASSERT_FALSE(answers[0]);
+    EXPECT_EQ(answers[0].error().code, ErrorCode::internal);
+    EXPECT_EQ(count_of(f.counters.failed), 1U);
+    ASSERT_TRUE(f.request(chunk(1, 1)));
+    EXPECT_TRUE(f.inbox.wait(2)[1]);
+}
+
+TEST(ChunkService, RefusesWhatItCanNotMake) {
+    Fixture f;
+    for (const std::int32_t lod : {-1, 1, 17, std::numeric_limits<std::int32_t>::max()}) {
+        const auto answer = f.request(ChunkKey{.position = {.lod = lod, .x = 0, .y = 0, .z = 0}});
+        ASSERT_FALSE(answer);
+        EXPECT_EQ(answer.error().code, ErrorCode::unsupported);
+    }
+    constexpr std::int64_t kEnd = (std::int64_t{1} << 31) * 32;
+    for (const std::int64_t at :
+         {kEnd, -kEnd - 1, kColumnCoordinateLimit, std::numeric_limits<std::int64_t>::min(),
+          std::numeric_limits<std::int64_t>::max()}) {
+        EXPECT_EQ(f.request(ColumnPos{.x = at, .z = 0}).error().code, ErrorCode::out_of_range);
+        EXPECT_EQ(f.request(ColumnPos{.x = 0, .z = at}).error().code, ErrorCode::out_of_range);
+    }
+    EXPECT_TRUE(f.request(ColumnPos{.x = kEnd - 1, .z = -kEnd}));
+    f.inbox.wait(1);
+}
+
+TEST(ChunkService, DrainingRefusesTheNewAndFinishesTheOld) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    f.service->drain();
+    EXPECT_EQ(f.request(chunk(2)).error().code, ErrorCode::draining);
+    f.gate.passes.release();
+    EXPECT_TRUE(f.inbox.wait(1)[0]);
+}
+
+TEST(ChunkService, StoppingAnswersWhoStillWaits) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2)));
+    f.gate.passes.release();
+    f.service->stop();
+    const auto answers = f.inbox.wait(2);
+    for (const auto& answer : answers) {
+        if (!answer) {
+            EXPECT_EQ(answer.error().code, ErrorCode::draining);
+        }
+    }
+    EXPECT_FALSE(answers[1]);
+}
+
+}  // namespace
+}  // namespace terrane

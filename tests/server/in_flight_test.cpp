@@ -1,0 +1,139 @@
+#include "server/chunks/in_flight.h"
+
+#include <gtest/gtest.h>
+
+namespace terrane {
+namespace {
+
+using Admitted = InFlight::Admitted;
+
+WorkKey chunk(std::int32_t x, std::int32_t y) {
+    return ChunkKey{.position = {.lod = 0, .x = x, .y = y, .z = 0}};
+}
+
+InFlight::Admission admit(InFlight& table, const WorkKey& key, WaiterId waiter,
+                          std::int32_t priority = 0) {
+    return table.admit(key, stack_of(key, 32), priority, {.id = waiter, .answer = {}});
+}
+
+constexpr InFlight::Bounds kRoomy{.keys_max = 100, .waiters_max = 100};
+
+TEST(InFlight, OneKeyIsOneTaskHoweverManyWait) {
+    InFlight table(kRoomy);
+    const auto first = admit(table, chunk(0, 0), 1);
+    EXPECT_EQ(first.outcome, Admitted::new_job);
+    EXPECT_EQ(admit(table, chunk(0, 0), 2).outcome, Admitted::joined_key);
+    const auto task = table.next(first.job);
+    ASSERT_TRUE(task);
+    EXPECT_EQ(admit(table, chunk(0, 0), 3).outcome, Admitted::joined_key);
+    EXPECT_EQ(table.finish(*task).size(), 3U);
+    EXPECT_FALSE(table.next(first.job));
+    EXPECT_EQ(table.size(), 0U);
+}
+
+TEST(InFlight, OneStackIsOneJobInTheOrderOfAsking) {
+    InFlight table(kRoomy);
+    const auto first = admit(table, chunk(0, 3), 1);
+    const auto second = admit(table, chunk(0, 1), 2);
+    const auto column = admit(table, ColumnPos{.x = 31, .z = 0}, 3);
+    EXPECT_EQ(second.outcome, Admitted::joined_job);
+    EXPECT_EQ(column.outcome, Admitted::joined_job);
+    EXPECT_EQ(second.job, first.job);
+    EXPECT_EQ(admit(table, chunk(1, 0), 4).outcome, Admitted::new_job);
+    EXPECT_EQ(table.next(first.job)->key, chunk(0, 3));
+    EXPECT_EQ(table.next(first.job)->key, chunk(0, 1));
+    EXPECT_EQ(table.next(first.job)->key, WorkKey(ColumnPos{.x = 31, .z = 0}));
+}
+
+TEST(InFlight, AKeyThatComesWhileItsStackRunsStaysInTheJob) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    const auto task = table.next(job);
+    EXPECT_EQ(admit(table, chunk(0, 1), 2).outcome, Admitted::joined_job);
+    table.finish(*task);
+    EXPECT_EQ(table.next(job)->key, chunk(0, 1));
+}
+
+TEST(InFlight, AJobThatEndedIsFollowedByANewOne) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    table.finish(*table.next(job));
+    EXPECT_FALSE(table.next(job));
+    const auto again = admit(table, chunk(0, 0), 2);
+    EXPECT_EQ(again.outcome, Admitted::new_job);
+    EXPECT_NE(again.job, job);
+}
+
+TEST(InFlight, TheLastWaiterToLeaveStopsTheWork) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    admit(table, chunk(0, 0), 2);
+    const auto task = table.next(job);
+    EXPECT_FALSE(table.leave(chunk(0, 0), 1).stopped);
+    EXPECT_FALSE(task->stop.stop_requested());
+    EXPECT_TRUE(table.leave(chunk(0, 0), 2).stopped);
+    EXPECT_TRUE(task->stop.stop_requested());
+    EXPECT_TRUE(table.finish(*task).empty());
+}
+
+TEST(InFlight, AJobNobodyTookIsIdleWhenItsLastKeyGoes) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    admit(table, chunk(0, 1), 2);
+    EXPECT_FALSE(table.leave(chunk(0, 0), 1).idle_job);
+    EXPECT_EQ(table.leave(chunk(0, 1), 2).idle_job, job);
+    EXPECT_FALSE(table.next(job));
+}
+
+TEST(InFlight, ALateResultDoesNotAnswerItsSuccessor) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    const auto stopped = table.next(job);
+    table.leave(chunk(0, 0), 1);
+    const auto again = admit(table, chunk(0, 0), 2);
+    EXPECT_EQ(again.outcome, Admitted::joined_job);  // the worker still holds the stack's job
+    EXPECT_TRUE(table.finish(*stopped).empty());
+    const auto task = table.next(job);
+    ASSERT_TRUE(task);
+    EXPECT_FALSE(task->stop.stop_requested());
+    const auto waiters = table.finish(*task);
+    ASSERT_EQ(waiters.size(), 1U);
+    EXPECT_EQ(waiters[0].id, 2U);
+}
+
+TEST(InFlight, RefusesAtItsBounds) {
+    InFlight keys({.keys_max = 1, .waiters_max = 100});
+    admit(keys, chunk(0, 0), 1);
+    EXPECT_EQ(admit(keys, chunk(0, 1), 2).outcome, Admitted::refused);
+    EXPECT_EQ(admit(keys, chunk(0, 0), 3).outcome, Admitted::joined_key);
+    InFlight waiters({.keys_max = 100, .waiters_max = 2});
+    admit(waiters, chunk(0, 0), 1);
+    admit(waiters, chunk(0, 0), 2);
+    EXPECT_EQ(admit(waiters, chunk(0, 0), 3).outcome, Admitted::refused);
+    EXPECT_TRUE(waiters.leave(chunk(0, 0), 2).found);
+    EXPECT_EQ(admit(waiters, chunk(0, 0), 3).outcome, Admitted::joined_key);
+}
+
+TEST(InFlight, AJobIsAsUrgentAsItsMostUrgentKey) {
+    InFlight table(kRoomy);
+    EXPECT_EQ(admit(table, chunk(0, 0), 1, -5).priority, -5);
+    EXPECT_EQ(admit(table, chunk(0, 1), 2, 7).priority, 7);
+    const auto last = admit(table, chunk(0, 0), 3, 2);
+    EXPECT_EQ(last.priority, 7);
+    EXPECT_EQ(table.priority_of(last.job), 7);
+}
+
+TEST(InFlight, AbandoningAJobGivesAllItsWaiters) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1).job;
+    admit(table, chunk(0, 1), 2);
+    admit(table, chunk(0, 1), 3);
+    admit(table, chunk(5, 0), 4);
+    EXPECT_EQ(table.abandon(job).size(), 3U);
+    EXPECT_EQ(table.size(), 1U);
+    EXPECT_EQ(table.abandon_all().size(), 1U);
+    EXPECT_EQ(table.size(), 0U);
+}
+
+}  // namespace
+}  // namespace terrane
