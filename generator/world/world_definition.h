@@ -14,6 +14,8 @@ namespace terrane {
 
 inline constexpr std::size_t kMaterialsMax = 256;
 inline constexpr std::int32_t kHeightBoundMax = 16384;  ///< voxels
+inline constexpr std::int32_t kChunkSideMin = 4;        ///< columns or voxels
+inline constexpr std::int32_t kChunkSideMax = 64;       ///< columns or voxels
 
 enum class MaterialKind : std::uint8_t { void_, base, regular, vein, cave };
 

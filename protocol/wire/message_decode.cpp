@@ -124,11 +124,11 @@ Result<WireMaterial> material_of(const wire::Material& table) {
 }
 
 Result<void> check_geometry(const wire::ServerHello& table) {
-    const auto side_is_valid = [](std::int32_t side) { return side >= 1 && side <= kChunkSideMax; };
+    const auto side_is_valid = [](std::int32_t side) { return side >= 1 && side <= kWireSideMax; };
     if (!side_is_valid(table.chunk_side()) || !side_is_valid(table.chunk_height())) {
         return bad(ErrorCode::malformed, "ServerHello: a chunk of ",
                    std::to_string(table.chunk_side()), " x ", std::to_string(table.chunk_height()),
-                   " voxels, sides are 1..", std::to_string(kChunkSideMax));
+                   " voxels, sides are 1..", std::to_string(kWireSideMax));
     }
     if (!std::isfinite(table.voxel_size_m()) || table.voxel_size_m() <= 0 ||
         !std::isfinite(table.height_bound_voxels())) {
@@ -318,7 +318,7 @@ Result<AnyMessage> read(const wire::WorldQuery& table) {
 }
 
 Result<AnyMessage> read(const wire::WorldDefinition& table) {
-    return text_of(table.toml(), kWorldFileBytesMax, "WorldDefinition.toml")
+    return text_of(table.toml(), kWorldTextBytesMax, "WorldDefinition.toml")
         .map([&table](std::string toml) {
             return AnyMessage(WorldAnswer{.request_id = table.request_id(),
                                           .toml = std::move(toml),

@@ -181,7 +181,7 @@ Offset<wire::WorldQuery> write(FlatBufferBuilder& builder, const WorldQuery& que
 }
 
 Offset<wire::WorldDefinition> write(FlatBufferBuilder& builder, const WorldAnswer& answer) {
-    TERRANE_ASSERT(answer.toml.size() <= kWorldFileBytesMax);  // cut, it would be another world
+    TERRANE_ASSERT(answer.toml.size() <= kWorldTextBytesMax);  // cut, it would be another world
     const auto toml = builder.CreateString(answer.toml);
     const wire::Hash fingerprint = wire_of(answer.fingerprint);
     return wire::CreateWorldDefinition(builder, answer.request_id, toml, &fingerprint);

@@ -41,12 +41,6 @@ bool beyond_every_surface(std::int32_t y, std::int32_t height) {
     return y < 0 || static_cast<std::int64_t>(y) * height > kHeightBoundMax + 1;
 }
 
-void clear_flow(Chunk& chunk) {
-    for (Limit& limit : chunk.columns.limits) {
-        limit.flow = {};
-    }
-}
-
 }  // namespace
 
 Hash128 content_id_of(const World& world) {
@@ -198,10 +192,7 @@ Result<EncodedChunk> ChunkBuilder::encode_columns(const ChunkKey& key, const Sta
         encoded.status = ChunkStatus::uniform;
         encoded.uniform = chunk_.uniform_content.composition;
     } else {
-        if (key.without_flow) {
-            clear_flow(chunk_);
-        }
-        encode_chunk(bytes_, chunk_);
+        encode_chunk(bytes_, chunk_, key.without_flow ? FlowPlane::without : FlowPlane::with);
         encoded.status = ChunkStatus::full;
         encoded.payload = std::make_shared<const Bytes>(encode_column_payload(bytes_));
     }
