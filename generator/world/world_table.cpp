@@ -210,12 +210,14 @@ std::optional<double> WorldTable::number(std::string_view key, NumberBounds boun
     return value;
 }
 
-std::optional<std::int64_t> WorldTable::integer(std::string_view key, IntegerBounds bounds,
+std::optional<std::int64_t> WorldTable::integer(std::string_view key, WholeBounds bounds,
                                                 Need need) {
     constexpr auto kAnyLeast = std::numeric_limits<std::int64_t>::min();
     constexpr auto kAnyMost = std::numeric_limits<std::int64_t>::max();
     std::string allowed = "it must be an integer";
-    if (bounds.least != kAnyLeast || bounds.most != kAnyMost) {
+    if (bounds.least == bounds.most) {
+        allowed = "it must be " + std::to_string(bounds.least);
+    } else if (bounds.least != kAnyLeast || bounds.most != kAnyMost) {
         allowed += " from " + std::to_string(bounds.least) + " to " + std::to_string(bounds.most);
     }
     const auto* value = node<toml::value<std::int64_t>>(key, allowed, need);

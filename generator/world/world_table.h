@@ -51,7 +51,7 @@ struct NumberBounds {
     double most = 0;
 };
 
-struct IntegerBounds {
+struct WholeBounds {
     std::int64_t least = 0;
     std::int64_t most = 0;
 };
@@ -69,7 +69,7 @@ class WorldTable {
         : table_(table), path_(std::move(path)), faults_(faults) {}
 
     std::optional<double> number(std::string_view key, NumberBounds bounds, Need need);
-    std::optional<std::int64_t> integer(std::string_view key, IntegerBounds bounds, Need need);
+    std::optional<std::int64_t> integer(std::string_view key, WholeBounds bounds, Need need);
     /// 0 to 1, or -1.
     std::optional<double> affinity(std::string_view key);
     std::optional<bool> flag(std::string_view key);

@@ -1,0 +1,152 @@
+#include "server/cli/world_report.h"
+
+#include "generator/world/generator_version.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <numeric>
+#include <string>
+#include <vector>
+
+namespace terrane {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::int32_t total(const std::vector<std::int32_t>& counts) {
+    return std::accumulate(counts.begin(), counts.end(), std::int32_t{0});
+}
+
+/// `decimals` digits after the point.
+std::string fixed_text(double value, int decimals) {
+    std::array<char, 64> buffer{};
+    const int size = std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
+    return {buffer.data(), static_cast<std::size_t>(std::clamp(size, 0, 63))};
+}
+
+std::string composition_text(const World& world, const Composition& composition) {
+    std::string text;
+    for (const Share& share : composition.shares()) {
+        text += text.empty() ? "" : ", ";
+        text += world.definition.materials[share.material].name + " " +
+                fixed_text(share.concentration, 3);
+    }
+    return text;
+}
+
+Json composition_json(const World& world, const Composition& composition) {
+    Json object = Json::object();
+    for (const Share& share : composition.shares()) {
+        object[world.definition.materials[share.material].name] = share.concentration;
+    }
+    return object;
+}
+
+void add_right(std::string& out, const std::string& text, std::size_t width) {
+    out.append(text.size() < width ? width - text.size() : 0, ' ').append(text);
+}
+
+std::string layer_table(const World& world) {
+    constexpr std::array kHeads = {"layer",      "bottom", "thickness", "roughness",
+                                   "similarity", "blend",  "veins",     "caves"};
+    constexpr std::size_t kGap = 2;
+    std::string out;
+    for (const char* head : kHeads) {
+        add_right(out, head, std::string_view(head).size() + kGap);
+    }
+    out += "  materials\n";
+    const LayerStack& stack = world.stack;
+    for (std::size_t i = stack.layers.size(); i-- > 0;) {
+        const Layer& layer = stack.layers[i];
+        const bool has_gap = i < stack.origin_veins.size();
+        const std::array<std::string, kHeads.size()> cells = {
+            std::to_string(i),
+            fixed_text(layer.bottom, 2),
+            fixed_text(layer.thickness, 2),
+            fixed_text(layer.roughness, 2),
+            fixed_text(layer.similarity, 3),
+            layer.alone ? "alone" : fixed_text(layer.blend, 3),
+            has_gap ? std::to_string(stack.origin_veins[i]) : "-",
+            has_gap ? std::to_string(stack.origin_caves[i]) : "-"};
+        for (std::size_t c = 0; c < cells.size(); ++c) {
+            add_right(out, cells[c], std::string_view(kHeads[c]).size() + kGap);
+        }
+        out += "  " + composition_text(world, layer.composition) + "\n";
+    }
+    return out;
+}
+
+std::int64_t signed_seed(const World& world) {
+    return static_cast<std::int64_t>(world.definition.seed);
+}
+
+}  // namespace
+
+std::string world_report_text(const World& world) {
+    const WorldDefinition& definition = world.definition;
+    const LayerStack& stack = world.stack;
+    const std::string side = std::to_string(definition.grid.side);
+    std::string out;
+    const auto line = [&](const char* head, const std::string& text) {
+        out += head;
+        out.append(15 - std::string_view(head).size(), ' ').append(text).append("\n");
+    };
+    line("name", definition.name);
+    line("seed", std::to_string(signed_seed(world)));
+    line("fingerprint", to_hex(world.fingerprint));
+    line("materials", std::to_string(definition.materials.size()));
+    line("depth", fixed_text(definition.terrain.depth, 2) + " voxels");
+    line("height bound",
+         fixed_text(stack.height_bound, 2) + " voxels: nothing solid stands higher");
+    line("chunk", side + " x " + std::to_string(definition.grid.height) + " x " + side +
+                      " voxels of " + fixed_text(definition.grid.voxel_size_m, 3) + " m");
+    line("plot", std::to_string(definition.grid.plot) + " columns a side");
+    line("origin plot", std::to_string(total(stack.origin_veins)) + " veins, " +
+                            std::to_string(total(stack.origin_caves)) + " caves");
+    line("other plots", "0.5 to 1.5 times " + fixed_text(stack.reference_veins, 2) + " veins, " +
+                            fixed_text(stack.reference_caves, 2) + " caves");
+    out +=
+        "\nLayers, the surface on top; lengths in voxels; veins and caves: of the origin plot, on\n"
+        "top of the layer.\n";
+    return out + layer_table(world);
+}
+
+std::string world_report_json(const World& world) {
+    const WorldDefinition& definition = world.definition;
+    const LayerStack& stack = world.stack;
+    Json layers = Json::array();
+    for (const Layer& layer : stack.layers) {
+        layers.push_back({{"bottom", layer.bottom},
+                          {"thickness", layer.thickness},
+                          {"roughness", layer.roughness},
+                          {"similarity", layer.similarity},
+                          {"blend", layer.blend},
+                          {"alone", layer.alone},
+                          {"composition", composition_json(world, layer.composition)}});
+    }
+    const Json report = {
+        {"name", definition.name},
+        {"seed", signed_seed(world)},
+        {"fingerprint", to_hex(world.fingerprint)},
+        {"generator_version", kGeneratorVersion},
+        {"materials", definition.materials.size()},
+        {"depth", definition.terrain.depth},
+        {"height_bound", stack.height_bound},
+        {"chunk", {definition.grid.side, definition.grid.height, definition.grid.side}},
+        {"plot", definition.grid.plot},
+        {"voxel_size_m", definition.grid.voxel_size_m},
+        {"origin",
+         {{"veins", total(stack.origin_veins)},
+          {"caves", total(stack.origin_caves)},
+          {"veins_by_gap", stack.origin_veins},
+          {"caves_by_gap", stack.origin_caves}}},
+        {"reference", {{"veins", stack.reference_veins}, {"caves", stack.reference_caves}}},
+        {"layers", layers}};
+    return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace terrane
