@@ -86,7 +86,7 @@ void add_grid(std::string& out, const Grid& grid) {
 }
 
 void add_material(std::string& out, const Material& material) {
-    const MaterialKeys keys = keys_of(material.kind);
+    const MaterialKeys keys = keys_of(material.kind, material.alone);
     out += "\n[[material]]\n";
     add_line(out, "id", std::to_string(material.id));
     add_line(out, "name", toml_string(material.name));

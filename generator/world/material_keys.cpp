@@ -20,23 +20,30 @@ std::string_view to_string(MaterialKind kind) {
     return {};
 }
 
-MaterialKeys keys_of(MaterialKind kind) {
+MaterialKeys keys_of(MaterialKind kind, bool alone) {
+    MaterialKeys keys = {.area = false,
+                         .depth = true,
+                         .thickness = true,
+                         .roughness = true,
+                         .similarity = false,
+                         .blend = !alone};
     switch (kind) {
         case MaterialKind::void_:
             return {};
         case MaterialKind::base:  // makes the first layer, whose choice ignores depth
-            return {.thickness = true, .roughness = true, .similarity = true, .blend = true};
+            keys.depth = false;
+            keys.similarity = true;
+            return keys;
         case MaterialKind::regular:
-            return {.depth = true,
-                    .thickness = true,
-                    .roughness = true,
-                    .similarity = true,
-                    .blend = true};
+            keys.similarity = true;
+            return keys;
         case MaterialKind::vein:
-            return {
-                .area = true, .depth = true, .thickness = true, .roughness = true, .blend = true};
+            keys.area = true;
+            return keys;
         case MaterialKind::cave:
-            return {.area = true, .depth = true, .thickness = true, .roughness = true};
+            keys.area = true;
+            keys.blend = false;
+            return keys;
     }
     TERRANE_ASSERT(false);
     return {};

@@ -78,7 +78,7 @@ Hash128 world_fingerprint(const WorldDefinition& definition);
 /// A kind as it stands in a world file: "void", "base", "regular", "vein" or "cave".
 std::string_view to_string(MaterialKind kind);
 
-/// Which of a material's keys its kind gives a meaning; the others are accepted and ignored.
+/// Which of a material's keys mean anything; the others are accepted and ignored.
 struct MaterialKeys {
     bool area = false;
     bool depth = false;
@@ -88,6 +88,7 @@ struct MaterialKeys {
     bool blend = false;
 };
 
-MaterialKeys keys_of(MaterialKind kind);
+/// An `alone` material never blends.
+MaterialKeys keys_of(MaterialKind kind, bool alone);
 
 }  // namespace terrane

@@ -135,7 +135,9 @@ std::string read_texture(WorldTable& table, const std::filesystem::path& folder,
 
 /// Properties that the kind gives no meaning are checked if they are there, and then left at zero.
 void read_properties(WorldTable& table, std::optional<MaterialKind> kind, Material& material) {
-    const MaterialKeys keys = kind ? keys_of(*kind) : MaterialKeys{};
+    const bool alone = table.flag("alone").value_or(false);
+    material.alone = alone && kind != MaterialKind::void_;
+    const MaterialKeys keys = kind ? keys_of(*kind, material.alone) : MaterialKeys{};
     const auto share = [&](std::string_view key, bool applies, double& value) {
         const auto read = table.number(key, kShare, applies ? Need::required : Need::optional);
         value = applies ? read.value_or(0) : 0;
@@ -151,8 +153,6 @@ void read_properties(WorldTable& table, std::optional<MaterialKind> kind, Materi
     range("roughness", keys.roughness, material.roughness);
     share("similarity", keys.similarity, material.similarity);
     share("blend", keys.blend, material.blend);
-    const bool alone = table.flag("alone").value_or(false);
-    material.alone = alone && kind != MaterialKind::void_;
 }
 
 Material read_material(const toml::table& source, const std::filesystem::path& texture_folder,
