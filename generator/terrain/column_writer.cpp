@@ -42,44 +42,21 @@ struct ColumnSource {
     }
 };
 
-/// A column without elements: per layer two limits at most, written unconditionally and kept by
-/// moving the end; no branch depends on the data.
-Limit* write_plain_column(Limit* out, const ColumnSource& source, const ColumnRules& rules) {
-    std::int32_t bottom = source.y256(0);
-    const Flow base_flow = source.flow(0);
-    *out++ = {.y256 = 0, .palette_id = 0, .flow = base_flow};
-    *out++ = {.y256 = bottom, .palette_id = 0, .flow = base_flow};
-    const std::size_t layers = rules.layers.size();
-    for (std::size_t k = 1; k < layers; ++k) {
-        const std::int32_t top = source.y256(k);
-        const std::int32_t blend = rules.layers[k].blend_on_below;
-        const std::int32_t least = blend > 0 ? 1 : 0;
-        const std::int32_t middle =
-            bottom + std::min(top - bottom, std::max(least, ((top - bottom) * blend + 128) >> 8));
-        const auto id = static_cast<std::uint16_t>(k);
-        const Flow flow = source.flow(k);
-        const bool stands = top > bottom;
-        *out = {.y256 = middle, .palette_id = id, .flow = flow};
-        out += (stands && middle < top) ? 1 : 0;
-        *out = {.y256 = top, .palette_id = id, .flow = flow};
-        out += stands ? 1 : 0;
-        bottom = std::max(bottom, top);
-    }
-    *out++ = {.y256 = bottom, .palette_id = static_cast<std::uint16_t>(layers), .flow = {}};
-    return out;
-}
-
 /// The general walk: elements, pinched layers and materials that are alone.
 class ColumnWalk {
   public:
-    ColumnWalk(Limit* out, const ColumnSource& source, const ColumnRules& rules)
+    ColumnWalk(Limit* out, const ColumnSource& source, const std::vector<LayerRules>& rules)
         : first_(out), out_(out), source_(source), rules_(rules) {}
 
     Limit* write(std::int32_t column, std::int32_t row) {
         const Region& region = source_.region;
-        const std::size_t layers = rules_.layers.size();
+        const std::size_t layers = rules_.size();
+        const std::uint64_t gaps = region.gap_mask[source_.at];
         for (std::size_t k = 0; k < layers; ++k) {
             layer(k);
+            if ((gaps >> k & 1U) == 0) {
+                continue;
+            }
             const std::size_t end =
                 k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
             float current = source_.height(k);
@@ -104,9 +81,8 @@ class ColumnWalk {
         if (top <= bottom_) {
             return;
         }
-        const LayerRules& rule = rules_.layers[k];
-        const bool blends =
-            from_ != kNone && rule.blend > 0 && !rule.alone && !rules_.layers[from_].alone;
+        const LayerRules& rule = rules_[k];
+        const bool blends = from_ != kNone && rule.blend > 0 && !rule.alone && !rules_[from_].alone;
         interval(top, static_cast<std::uint16_t>(k), source_.flow(k), blends ? rule.blend : 0);
         from_ = static_cast<std::uint16_t>(k);
     }
@@ -119,8 +95,8 @@ class ColumnWalk {
         const Element& own = source_.region.elements[e].element();
         const bool is_cave = own.type == ElementType::cave;
         const bool blends = first_owner && from_ != kNone && own.blend > 0 && !is_cave &&
-                            !own.content.alone && !rules_.layers[from_].alone;
-        const auto id = static_cast<std::uint16_t>(rules_.layers.size() + 1 + e);
+                            !own.content.alone && !rules_[from_].alone;
+        const auto id = static_cast<std::uint16_t>(rules_.size() + 1 + e);
         interval(top, id, is_cave ? Flow{} : source_.flow(k), blends ? own.blend : 0);
     }
 
@@ -155,7 +131,7 @@ class ColumnWalk {
     Limit* first_;
     Limit* out_;
     const ColumnSource& source_;
-    const ColumnRules& rules_;
+    const std::vector<LayerRules>& rules_;
     std::int32_t bottom_ = 0;
     std::uint16_t from_ = kNone;  ///< the last layer with something of its own below
 };
@@ -194,58 +170,121 @@ void number_elements(const ColumnWriterOutput& out, const Region& region, const 
 
 }  // namespace
 
-ColumnRules::ColumnRules(const World& world) {
-    for (const Layer& layer : world.stack.layers) {
-        layers.push_back({.blend = layer.alone ? 0 : blend256(layer.blend), .alone = layer.alone});
-        any_alone = any_alone || layer.alone;
-    }
-    for (std::size_t k = 1; k < layers.size(); ++k) {
-        layers[k].blend_on_below = layers[k - 1].alone ? 0 : layers[k].blend;
-    }
+/// Limits a column can have at most: two a layer and one where it begins, three an element, the
+/// void's.
+std::size_t column_limits_max(const Region& region, std::size_t layers) {
+    return 3 * layers + 3 * region.elements.size() + 1;
 }
 
-void write_columns(const ColumnWriterOutput& out, const Region& region, const World& world,
-                   const ColumnRules& rules, std::int32_t apron) {
-    ColumnGrid& grid = out.grid;
-    grid.x_first = -apron;
-    grid.z_first = -apron;
-    grid.width = region.inner.width + 2 * apron;
-    grid.length = region.inner.length + 2 * apron;
-    const auto columns =
-        static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.length);
-    grid.offsets.resize(columns + 1);
-    grid.offsets[0] = 0;
-    // Two limits a layer and three an element at most, the base's two and the void's.
-    const std::size_t column_limits_max =
-        2 * rules.layers.size() + 3 * (region.elements.size() + 1) + rules.layers.size();
-    std::size_t used = 0;
-    std::size_t column_index = 0;
-    out.highest_y256 = 0;
-    for (std::int32_t z = -apron; z < region.inner.length + apron; ++z) {
-        const std::size_t row_limits = column_limits_max * static_cast<std::size_t>(grid.width);
-        if (grid.limits.size() < used + row_limits) {
-            grid.limits.resize(std::max(used + row_limits, 2 * grid.limits.size()));
+/// One row of columns, run by run.
+class RowWriter {
+  public:
+    RowWriter(const Region& region, const std::vector<LayerRules>& rules, const RowKernels& kernels,
+              std::int32_t z)
+        : region_(region), rules_(rules), kernels_(kernels), z_(z) {
+        const auto shape_row = static_cast<std::ptrdiff_t>(z + 1) * region.shape.stride();
+        plain_.y256 = region.y256.data() + shape_row;
+        plain_.middle = region.middle.data() + shape_row;
+        plain_.plane = static_cast<std::int64_t>(region.plane_size());
+        plain_.flow_plane = static_cast<std::int64_t>(region.flow_plane_size());
+        plain_.layers = static_cast<std::int32_t>(rules.size());
+        irregular_ = region.irregular.data() + shape_row;
+    }
+
+    /// Columns first <= x < end; `end_of` gets where each one's limits end, counted from `base`.
+    Limit* write(Limit* out, std::int32_t first, std::int32_t end, bool has_flow,
+                 std::uint32_t* end_of, const Limit* base) {
+        if (has_flow) {
+            plain_.flow =
+                region_.flow.data() + static_cast<std::ptrdiff_t>(z_) * region_.flow_stride - 1;
+        } else {
+            plain_.flow = nullptr;
         }
-        for (std::int32_t x = -apron; x < region.inner.width + apron; ++x) {
-            const bool inner =
-                x >= 0 && z >= 0 && x < region.inner.width && z < region.inner.length;
-            const ColumnSource source{
-                .region = region,
-                .at = static_cast<std::size_t>((z + 1) * region.shape.stride() + x + 1),
-                .flow_at = inner ? static_cast<std::size_t>(z * region.flow_stride + x) : 0,
-                .has_flow = inner};
-            Limit* const begin = grid.limits.data() + used;
-            Limit* const end = region.has_element[source.at] != 0 || rules.any_alone
-                                   ? ColumnWalk(begin, source, rules).write(x + 1, z + 1)
-                                   : write_plain_column(begin, source, rules);
-            used += static_cast<std::size_t>(end - begin);
-            grid.offsets[++column_index] = static_cast<std::uint32_t>(used);
-            if (inner) {
-                out.highest_y256 = std::max(out.highest_y256, end[-1].y256);
+        const std::int32_t plain_limits = 2 * plain_.layers + 1;
+        for (std::int32_t x = first; x < end;) {
+            std::int32_t stop = x;
+            while (stop < end && irregular_[stop + 1] == 0) {
+                ++stop;
             }
+            if (stop > x) {
+                kernels_.plain_columns(out, plain_, x + 1, stop - x);
+                for (; x < stop; ++x) {
+                    out += plain_limits;
+                    *end_of++ = static_cast<std::uint32_t>(out - base);
+                }
+                continue;
+            }
+            const ColumnSource source{
+                .region = region_,
+                .at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1),
+                .flow_at = has_flow ? static_cast<std::size_t>(z_ * region_.flow_stride + x) : 0,
+                .has_flow = has_flow};
+            out = ColumnWalk(out, source, rules_).write(x + 1, z_ + 1);
+            *end_of++ = static_cast<std::uint32_t>(out - base);
+            ++x;
+        }
+        return out;
+    }
+
+  private:
+    const Region& region_;
+    const std::vector<LayerRules>& rules_;
+    const RowKernels& kernels_;
+    std::int32_t z_;
+    PlainRow plain_;
+    const std::uint8_t* irregular_ = nullptr;
+};
+
+/// The highest limit of the inner columns: what is void above it is void for ever.
+std::int32_t highest_limit(const ColumnGrid& grid, std::int32_t apron) {
+    std::int32_t highest = 0;
+    for (std::int32_t z = 0; z < grid.length - 2 * apron; ++z) {
+        for (std::int32_t x = 0; x < grid.width - 2 * apron; ++x) {
+            const std::uint32_t end = grid.offsets[grid.index_of(x, z) + 1];
+            highest = std::max(highest, grid.limits[end - 1].y256);
         }
     }
+    return highest;
+}
+
+}  // namespace
+
+void write_columns(const ColumnWriterOutput& out, const Region& region, const World& world,
+                   const TerrainConstants& constants, std::int32_t apron,
+                   const RowKernels& kernels) {
+    ColumnGrid& grid = out.grid;
+    const std::int32_t width = region.inner.width;
+    const std::int32_t length = region.inner.length;
+    grid.x_first = -apron;
+    grid.z_first = -apron;
+    grid.width = width + 2 * apron;
+    grid.length = length + 2 * apron;
+    const auto row_columns = static_cast<std::size_t>(grid.width);
+    grid.offsets.resize(row_columns * static_cast<std::size_t>(grid.length) + 1);
+    grid.offsets[0] = 0;
+    const std::size_t row_limits_max =
+        row_columns * column_limits_max(region, constants.rules.size());
+    std::size_t used = 0;
+    std::uint32_t* end_of = grid.offsets.data() + 1;
+    for (std::int32_t z = -apron; z < length + apron; ++z) {
+        if (grid.limits.size() < used + row_limits_max) {
+            grid.limits.resize(std::max(used + row_limits_max, 2 * grid.limits.size()));
+        }
+        Limit* const base = grid.limits.data();
+        Limit* at = base + used;
+        RowWriter row(region, constants.rules, kernels, z);
+        if (z < 0 || z >= length) {
+            at = row.write(at, -apron, width + apron, false, end_of, base);
+        } else {
+            at = row.write(at, -apron, 0, false, end_of, base);
+            at = row.write(at, 0, width, true, end_of + apron, base);
+            at = row.write(at, width, width + apron, false, end_of + apron + width, base);
+        }
+        end_of += row_columns;
+        used = static_cast<std::size_t>(at - base);
+    }
     grid.limits.resize(used);
+    out.highest_y256 = highest_limit(grid, apron);
     number_elements(out, region, world);
 }
 

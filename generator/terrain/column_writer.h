@@ -11,22 +11,6 @@
 
 namespace terrane {
 
-/// What writing a layer's limits takes, made once per generator.
-struct LayerRules {
-    std::int32_t blend = 0;           ///< share of the thickness that blends, 1/256; 0 is sharp
-    std::int32_t blend_on_below = 0;  ///< the same, 0 if it never blends into the layer right below
-    bool alone = false;
-};
-
-struct ColumnRules {
-    std::vector<LayerRules> layers;
-    bool any_alone = false;
-
-    explicit ColumnRules(const World& world);
-};
-
-/// Which columns to write: the region's inner ones (apron 0), or those around them too (apron 1;
-/// these have no flow).
 struct ColumnWriterOutput {
     ColumnGrid& grid;
     Palette& palette;                         ///< layers, void, then the elements that own a limit
@@ -34,7 +18,10 @@ struct ColumnWriterOutput {
     std::vector<std::uint16_t>& element_ids;  ///< scratch
 };
 
+/// Writes the region's inner columns (apron 0), or those around them too (apron 1; these have no
+/// flow). One thread.
 void write_columns(const ColumnWriterOutput& out, const Region& region, const World& world,
-                   const ColumnRules& rules, std::int32_t apron);
+                   const TerrainConstants& constants, std::int32_t apron,
+                   const RowKernels& kernels);
 
 }  // namespace terrane

@@ -58,35 +58,60 @@ Outline draw_outline(const Element& element) {
 }
 
 /// Rows of a rectangle that a segment crosses: az <= z < bz or the other way round.
-void add_crossings(const ElementShape& shape, std::size_t segment, const LocalRectangle& rectangle,
+void add_crossings(const ElementShape& shape, std::size_t point, const LocalRectangle& rectangle,
                    RasterBuffers& buffers) {
-    const std::size_t next = (segment + 1) % kOutlinePoints;
-    const float az = shape.az[segment];
-    const float bz = shape.az[next];
+    const std::size_t next = (point + 1) % kOutlinePoints;
+    const float az = shape.z[point];
+    const float bz = shape.z[next];
     const auto first_row = static_cast<std::int64_t>(std::ceil(std::min(az, bz)));
     const auto end_row = static_cast<std::int64_t>(std::ceil(std::max(az, bz)));
     const std::int64_t begin = std::max(first_row, rectangle.z0);
     const std::int64_t end = std::min(end_row, rectangle.z0 + rectangle.length);
+    if (begin >= end) {
+        return;
+    }
+    const float slope = (shape.x[next] - shape.x[point]) / (bz - az);
     for (std::int64_t z = begin; z < end; ++z) {
         const auto row = static_cast<std::size_t>(z - rectangle.z0);
-        const float x = shape.ax[segment] +
-                        (static_cast<float>(z) - az) * (shape.ex[segment] / shape.ez[segment]);
         const auto at = static_cast<std::size_t>(buffers.crossing_counts[row]++);
-        buffers.crossings[row * kOutlinePoints + at] = x;
+        buffers.crossings[row * kOutlinePoints + at] =
+            shape.x[point] + (static_cast<float>(z) - az) * slope;
     }
 }
 
-struct ColumnSpan {
-    std::int32_t begin = 0;
-    std::int32_t end = 0;
-};
-
-ColumnSpan clip(float x0, float x1, const LocalRectangle& rectangle) {
+/// Marks the columns between each pair of crossings of a row: ceil(x0) <= x < ceil(x1).
+void mark_inside(std::uint8_t* inside, float* crossings, std::size_t count,
+                 const LocalRectangle& rectangle) {
+    std::sort(crossings, crossings + count);
     const auto to_column = [&rectangle](float x) {
         const std::int64_t column = static_cast<std::int64_t>(std::ceil(x)) - rectangle.x0;
-        return static_cast<std::int32_t>(std::clamp<std::int64_t>(column, 0, rectangle.width));
+        return std::clamp<std::int64_t>(column, 0, rectangle.width);
     };
-    return {.begin = to_column(x0), .end = to_column(x1)};
+    for (std::size_t i = 0; i + 1 < count; i += 2) {
+        const std::int64_t begin = to_column(crossings[i]);
+        const std::int64_t end = to_column(crossings[i + 1]);
+        if (begin < end) {
+            std::fill(inside + begin, inside + end, std::uint8_t{1});
+        }
+    }
+}
+
+/// A tile's place in a rectangle, and how much of it lies there.
+struct Tile {
+    std::int32_t column = 0;
+    std::int32_t row = 0;
+    std::int32_t columns = 0;
+    std::int32_t rows = 0;
+};
+
+bool any_inside(const std::uint8_t* inside, std::int32_t width, const Tile& tile) {
+    unsigned any = 0;
+    for (std::int32_t z = tile.row; z < tile.row + tile.rows; ++z) {
+        for (std::int32_t x = tile.column; x < tile.column + tile.columns; ++x) {
+            any |= inside[z * width + x];
+        }
+    }
+    return any != 0;
 }
 
 }  // namespace
@@ -104,15 +129,19 @@ ElementShape make_shape(const Element& element) {
     ElementShape shape;
     for (std::size_t i = 0; i < kOutlinePoints; ++i) {
         const Point& p = outline.points[i];
-        shape.ax[i] = static_cast<float>((p.x - middle.x) * scale + element.center_x);
-        shape.az[i] = static_cast<float>((p.z - middle.z) * scale + element.center_z);
+        shape.x[i] = static_cast<float>((p.x - middle.x) * scale + element.center_x);
+        shape.z[i] = static_cast<float>((p.z - middle.z) * scale + element.center_z);
     }
+    SegmentTable& segments = shape.segments;
     for (std::size_t i = 0; i < kOutlinePoints; ++i) {
         const std::size_t next = (i + 1) % kOutlinePoints;
-        shape.ex[i] = shape.ax[next] - shape.ax[i];
-        shape.ez[i] = shape.az[next] - shape.az[i];
-        const float square = shape.ex[i] * shape.ex[i] + shape.ez[i] * shape.ez[i];
-        shape.inverse_square[i] = square > 0 ? 1.0F / square : 0.0F;
+        const std::size_t at = i % kSegmentsPerGroup * kSegmentGroups + i / kSegmentsPerGroup;
+        segments.ax[at] = shape.x[i];
+        segments.az[at] = shape.z[i];
+        segments.ex[at] = shape.x[next] - shape.x[i];
+        segments.ez[at] = shape.z[next] - shape.z[i];
+        const float square = segments.ex[at] * segments.ex[at] + segments.ez[at] * segments.ez[at];
+        segments.inverse_square[at] = square > 0 ? 1.0F / square : 0.0F;
     }
     return shape;
 }
@@ -121,32 +150,42 @@ void raster_element(float* out, std::int32_t stride, const Element& element,
                     const ElementShape& shape, const LocalRectangle& rectangle,
                     const RowKernels& kernels, RasterBuffers& buffers) {
     const auto rows = static_cast<std::size_t>(rectangle.length);
+    const auto width = static_cast<std::size_t>(rectangle.width);
     buffers.crossing_counts.assign(rows, 0);
     buffers.crossings.resize(std::max(buffers.crossings.size(), rows * kOutlinePoints));
+    buffers.inside.assign(rows * width, 0);
     for (std::size_t i = 0; i < kOutlinePoints; ++i) {
         add_crossings(shape, i, rectangle, buffers);
     }
-    const SegmentTable segments = shape.segments();
-    const float inverse_half_side = 2.0F / element.side;
     for (std::size_t row = 0; row < rows; ++row) {
-        float* const values = out + static_cast<std::ptrdiff_t>(row) * stride;
-        float* const crossings = buffers.crossings.data() + row * kOutlinePoints;
-        const auto count = static_cast<std::size_t>(buffers.crossing_counts[row]);
-        std::sort(crossings, crossings + count);
-        const float z = static_cast<float>(rectangle.z0 + static_cast<std::int64_t>(row));
-        std::int32_t done = 0;
-        for (std::size_t i = 0; i + 1 < count; i += 2) {
-            const ColumnSpan span = clip(crossings[i], crossings[i + 1], rectangle);
-            if (span.begin >= span.end) {
+        mark_inside(buffers.inside.data() + row * width,
+                    buffers.crossings.data() + row * kOutlinePoints,
+                    static_cast<std::size_t>(buffers.crossing_counts[row]), rectangle);
+        std::fill_n(out + row * static_cast<std::size_t>(stride), width, 0.0F);
+    }
+    const float inverse_half_side = 2.0F / element.side;
+    std::array<float, kTileSide * kTileSide> values{};
+    for (Tile tile; tile.row < rectangle.length; tile.row += kTileSide) {
+        tile.rows = std::min(kTileSide, rectangle.length - tile.row);
+        for (tile.column = 0; tile.column < rectangle.width; tile.column += kTileSide) {
+            tile.columns = std::min(kTileSide, rectangle.width - tile.column);
+            if (!any_inside(buffers.inside.data(), rectangle.width, tile)) {
                 continue;
             }
-            std::fill(values + done, values + span.begin, 0.0F);
-            kernels.element_row(values + span.begin, static_cast<float>(rectangle.x0 + span.begin),
-                                z, span.end - span.begin, segments, inverse_half_side,
-                                element.thickness);
-            done = span.end;
+            kernels.element_tile(values.data(), static_cast<float>(rectangle.x0 + tile.column),
+                                 static_cast<float>(rectangle.z0 + tile.row), shape.segments,
+                                 inverse_half_side, element.thickness);
+            for (std::int32_t z = 0; z < tile.rows; ++z) {
+                for (std::int32_t x = 0; x < tile.columns; ++x) {
+                    const std::int32_t column = tile.column + x;
+                    const std::int32_t row = tile.row + z;
+                    if (buffers.inside[static_cast<std::size_t>(row * rectangle.width + column)]) {
+                        out[row * stride + column] =
+                            values[static_cast<std::size_t>(z * kTileSide + x)];
+                    }
+                }
+            }
         }
-        std::fill(values + done, values + stride, 0.0F);
     }
 }
 

@@ -11,25 +11,14 @@
 
 namespace terrane {
 
-inline constexpr std::int32_t kOutlinePoints = 128;
+inline constexpr std::int32_t kOutlinePoints = kSegments;
 
 /// A closed polygon, plot-local columns. Displacement is radial, so it never crosses itself.
 /// Segment i runs from point i to point i + 1.
 struct ElementShape {
-    std::array<float, kOutlinePoints> ax{};
-    std::array<float, kOutlinePoints> az{};
-    std::array<float, kOutlinePoints> ex{};  ///< towards the next point
-    std::array<float, kOutlinePoints> ez{};
-    std::array<float, kOutlinePoints> inverse_square{};  ///< 1 / |e|^2, or 0
-
-    SegmentTable segments() const {
-        return {.ax = ax.data(),
-                .az = az.data(),
-                .ex = ex.data(),
-                .ez = ez.data(),
-                .inverse_square = inverse_square.data(),
-                .count = kOutlinePoints};
-    }
+    std::array<float, kOutlinePoints> x{};
+    std::array<float, kOutlinePoints> z{};
+    SegmentTable segments{};
 };
 
 ElementShape make_shape(const Element& element);
@@ -46,10 +35,11 @@ struct LocalRectangle {
 struct RasterBuffers {
     std::vector<float> crossings;
     std::vector<std::int32_t> crossing_counts;
+    std::vector<std::uint8_t> inside;
 };
 
 /// Thickness in voxels at each column of the rectangle, 0 outside the outline. `out` has
-/// `length` rows of `stride` >= padded_width(width) + kVectorPad values.
+/// `length` rows of `stride` >= width values.
 void raster_element(float* out, std::int32_t stride, const Element& element,
                     const ElementShape& shape, const LocalRectangle& rectangle,
                     const RowKernels& kernels, RasterBuffers& buffers);

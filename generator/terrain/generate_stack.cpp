@@ -10,10 +10,9 @@
 namespace terrane {
 
 struct StackGenerator::Buffers {
-    explicit Buffers(const World& world) : constants(world), rules(world) {}
+    explicit Buffers(const World& world) : constants(world) {}
 
     TerrainConstants constants;
-    ColumnRules rules;
     PlotCache plots;
     Region region;
     std::vector<std::uint16_t> element_ids;
@@ -63,7 +62,7 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
                    .palette = out.palette,
                    .highest_y256 = out.highest_y256,
                    .element_ids = buffers_->element_ids},
-                  buffers_->region, *world_, buffers_->rules, 1);
+                  buffers_->region, *world_, buffers_->constants, 1, *kernels_);
     return {};
 }
 
@@ -77,7 +76,7 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
                    .palette = out.palette,
                    .highest_y256 = out.highest_y256,
                    .element_ids = buffers_->element_ids},
-                  buffers_->region, *world_, buffers_->rules, 0);
+                  buffers_->region, *world_, buffers_->constants, 0, *kernels_);
     return {};
 }
 

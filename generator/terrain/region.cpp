@@ -1,5 +1,6 @@
 #include "generator/terrain/region.h"
 
+#include "generator/terrain/choose_composition.h"
 #include "generator/terrain/random.h"
 #include "protocol/base/check.h"
 #include "protocol/base/coords.h"
@@ -42,7 +43,7 @@ std::optional<PlacedElement> place(const PlottedElement& plotted, const Rectangl
     if (placed.columns <= 0 || placed.rows <= 0) {
         return std::nullopt;
     }
-    placed.stride = padded_width(placed.columns) + kVectorPad;
+    placed.stride = placed.columns;
     return placed;
 }
 
@@ -109,6 +110,7 @@ void find_elements(Region& region, const World& world, PlotCache& plots,
 
 /// Raises S by an element that stands on layer heights `height`, and marks its columns.
 void lay_element(Region& region, const PlacedElement& placed, const float* height) {
+    const std::uint64_t gap_bit = std::uint64_t{1} << static_cast<unsigned>(placed.element().gap);
     for (std::int32_t row = 0; row < placed.rows; ++row) {
         const auto first = static_cast<std::size_t>(
             (placed.row_first + row) * region.shape.stride() + placed.column_first);
@@ -117,7 +119,8 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
             static_cast<std::size_t>(row) * static_cast<std::size_t>(placed.stride);
         for (std::size_t i = 0; i < static_cast<std::size_t>(placed.columns); ++i) {
             if (thickness[i] > 0) {
-                region.has_element[first + i] = 1;
+                region.gap_mask[first + i] |= gap_bit;
+                region.irregular[first + i] = 1;
                 region.stacked[first + i] =
                     std::max(region.stacked[first + i], height[first + i] + thickness[i]);
             }
@@ -152,7 +155,9 @@ void allocate(Region& region, std::size_t layers) {
     grow(region.heights, plane * layers + 2 * kVectorPad);
     grow(region.y256, plane * layers);
     grow(region.flow, region.flow_plane_size() * layers);
-    region.has_element.assign(plane, 0);
+    grow(region.middle, plane * layers);
+    region.gap_mask.assign(plane, 0);
+    region.irregular.assign(plane, 0);
 }
 
 }  // namespace
@@ -170,6 +175,10 @@ TerrainConstants::TerrainConstants(const World& world) {
              .similarity = static_cast<float>(layer.similarity),
              .roughness = static_cast<float>(layer.roughness * (1 - layer.similarity)),
              .top = static_cast<float>(layer.top())});
+        const std::int32_t blend = layer.alone ? 0 : blend256(layer.blend);
+        const bool below_alone = k > 0 && world.stack.layers[k - 1].alone;
+        rules.push_back(
+            {.blend = blend, .blend_on_below = below_alone ? 0 : blend, .alone = layer.alone});
     }
 }
 
@@ -188,6 +197,7 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
     plots.trim();
     find_elements(region, world, plots, kernels);
     const std::size_t plane = region.plane_size();
+    std::fill_n(region.middle.begin(), plane, 0);
     std::fill_n(region.stacked.begin(), plane, 1.0F);  // the base is never thinner than a voxel
     const auto values = static_cast<std::int32_t>(plane);
     for (std::size_t k = 0; k < layers; ++k) {
@@ -196,7 +206,12 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
         float* const heights = region.heights.data() + k * plane;
         kernels.heights(heights, region.stacked.data(), region.noise.data(), values,
                         constants.heights[k]);
-        kernels.quantise(region.y256.data() + k * plane, heights, values);
+        std::int32_t* const y256 = region.y256.data() + k * plane;
+        kernels.quantise(y256, heights, values);
+        if (k > 0) {
+            kernels.blends(region.middle.data() + k * plane, region.irregular.data(), y256 - plane,
+                           y256, constants.rules[k].blend_on_below, values);
+        }
         const std::size_t end = k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
         for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
             lay_element(region, region.elements[e], heights);

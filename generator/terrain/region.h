@@ -62,11 +62,19 @@ struct Region {
     }
 };
 
+/// How a layer's limits are written.
+struct LayerRules {
+    std::int32_t blend = 0;           ///< share of the thickness that blends, 1/256; 0 is sharp
+    std::int32_t blend_on_below = 0;  ///< the same, 0 if it never blends into the layer right below
+    bool alone = false;
+};
+
 /// Noises and constants of a world's layers, made once per generator.
 struct TerrainConstants {
     std::vector<Noise> height_noise;
     std::vector<Noise> flow_noise;
     std::vector<HeightConstants> heights;
+    std::vector<LayerRules> rules;
 
     explicit TerrainConstants(const World& world);
 };

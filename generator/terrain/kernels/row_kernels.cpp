@@ -161,44 +161,129 @@ void quantise(std::int32_t* __restrict y256, const float* __restrict height, std
     }
 }
 
-void element_row(float* __restrict thickness, float x_first, float z, std::int32_t count,
-                 const SegmentTable& segments, float inverse_half_side, float thick) {
-    const float* __restrict ax = segments.ax;
-    const float* __restrict az = segments.az;
-    const float* __restrict ex = segments.ex;
-    const float* __restrict ez = segments.ez;
-    const float* __restrict il = segments.inverse_square;
+void blends(std::int32_t* __restrict middle, std::uint8_t* __restrict irregular,
+            const std::int32_t* __restrict bottom, const std::int32_t* __restrict top,
+            std::int32_t blend, std::int32_t count) {
+    const std::int32_t least = blend > 0 ? 1 : 0;
     for (std::int32_t first = 0; first < count; first += kBlock) {
-        float x[kBlock];
-        float nearest[kBlock];
-        for (std::int32_t i = 0; i < kBlock; ++i) {
-            x[i] = x_first + static_cast<float>(first + i);
-            nearest[i] = 3.0e38F;
+        for (std::int32_t i = first; i < first + kBlock; ++i) {
+            const std::int32_t thickness = top[i] - bottom[i];
+            std::int32_t part = (thickness * blend + 128) >> 8;
+            part = part < least ? least : part;
+            middle[i] = bottom[i] + part;
+            irregular[i] = static_cast<std::uint8_t>(irregular[i] | (part >= thickness ? 1 : 0));
         }
-        for (std::int32_t s = 0; s < segments.count; ++s) {
-            const float dz = z - az[s];
-            const float along_z = dz * ez[s];
-            const float sx = ax[s];
-            const float sex = ex[s];
-            const float sez = ez[s];
-            const float sil = il[s];
-            for (std::int32_t i = 0; i < kBlock; ++i) {
-                const float dx = x[i] - sx;
-                float t = (dx * sex + along_z) * sil;
-                t = t < 0.0F ? 0.0F : t;
-                t = t > 1.0F ? 1.0F : t;
-                const float qx = dx - t * sex;
-                const float qz = dz - t * sez;
-                const float q = qx * qx + qz * qz;
+    }
+}
+
+/// A limit's bytes; `tail` is palette id | flow << 16.
+void store(char* to, std::int32_t y256, std::uint64_t tail) {
+    __builtin_memcpy(to, &y256, sizeof y256);
+    __builtin_memcpy(to + sizeof y256, &tail, sizeof tail);
+}
+
+void plain_columns(void* limits, const PlainRow& row, std::int32_t first, std::int32_t count) {
+    constexpr std::int32_t kLimitBytes = 12;
+    char* to = static_cast<char*>(limits);
+    const auto void_tail = static_cast<std::uint64_t>(row.layers);
+    const std::int32_t* const no_flow = nullptr;
+    for (std::int32_t i = first; i < first + count; ++i) {
+        const std::int32_t* y = row.y256 + i;
+        const std::int32_t* middle = row.middle + i;
+        const std::int32_t* packed = row.flow != no_flow ? row.flow + i : no_flow;
+        for (std::int32_t k = 0; k < row.layers; ++k) {
+            const std::uint64_t flow_bits =
+                packed != no_flow ? static_cast<std::uint64_t>(static_cast<std::uint32_t>(*packed))
+                                  : 0;
+            const std::uint64_t tail = static_cast<std::uint64_t>(k) | flow_bits << 16U;
+            store(to, *middle, tail);
+            store(to + kLimitBytes, *y, tail);
+            to += 2 * kLimitBytes;
+            y += row.plane;
+            middle += row.plane;
+            packed = packed != no_flow ? packed + row.flow_plane : no_flow;
+        }
+        store(to, *(y - row.plane), void_tail);
+        to += kLimitBytes;
+    }
+}
+
+float clamp01(float t) {
+    t = t < 0.0F ? 0.0F : t;
+    return t > 1.0F ? 1.0F : t;
+}
+
+/// Squared distance from (x, z) to a segment.
+float square_to_segment(float x, float z, float ax, float az, float ex, float ez, float inverse) {
+    const float dx = x - ax;
+    const float dz = z - az;
+    const float t = clamp01((dx * ex + dz * ez) * inverse);
+    const float qx = dx - t * ex;
+    const float qz = dz - t * ez;
+    return qx * qx + qz * qz;
+}
+
+/// How near each run of segments comes to a point, squared; the nearest of all is returned.
+float nearest_of_groups(float* __restrict nearest, float x, float z, const SegmentTable& segments) {
+    for (std::int32_t g = 0; g < kSegmentGroups; ++g) {
+        nearest[g] = 3.0e38F;
+    }
+    for (std::int32_t j = 0; j < kSegments; j += kSegmentGroups) {
+        for (std::int32_t g = 0; g < kSegmentGroups; ++g) {
+            const float q =
+                square_to_segment(x, z, segments.ax[j + g], segments.az[j + g], segments.ex[j + g],
+                                  segments.ez[j + g], segments.inverse_square[j + g]);
+            nearest[g] = q < nearest[g] ? q : nearest[g];
+        }
+    }
+    float least = nearest[0];
+    for (std::int32_t g = 1; g < kSegmentGroups; ++g) {
+        least = nearest[g] < least ? nearest[g] : least;
+    }
+    return least;
+}
+
+void element_tile(float* __restrict thickness, float x, float z, const SegmentTable& segments,
+                  float inverse_half_side, float thick) {
+    // The nearest segment of any column of the tile is at most the tile's diagonal farther from the
+    // tile's middle than the middle's own nearest one; the slack is far above rounding errors.
+    constexpr float kHalf = 0.5F * (kTileSide - 1);
+    constexpr float kDiagonal = 4.2427F;
+    float group_nearest[kSegmentGroups];
+    const float middle = nearest_of_groups(group_nearest, x + kHalf, z + kHalf, segments);
+    const float reach = (__builtin_sqrtf(middle) + kDiagonal) * 1.001F + 0.01F;
+    const float reach_square = reach * reach;
+    constexpr std::int32_t kTile = kTileSide * kTileSide;
+    float column_x[kTile];
+    float column_z[kTile];
+    float nearest[kTile];
+    for (std::int32_t i = 0; i < kTile; ++i) {
+        column_x[i] = x + static_cast<float>(i % kTileSide);
+        column_z[i] = z + static_cast<float>(i / kTileSide);
+        nearest[i] = 3.0e38F;
+    }
+    for (std::int32_t g = 0; g < kSegmentGroups; ++g) {
+        if (group_nearest[g] > reach_square) {
+            continue;
+        }
+        for (std::int32_t j = g; j < kSegments; j += kSegmentGroups) {
+            const float ax = segments.ax[j];
+            const float az = segments.az[j];
+            const float ex = segments.ex[j];
+            const float ez = segments.ez[j];
+            const float inverse = segments.inverse_square[j];
+            for (std::int32_t i = 0; i < kTile; ++i) {
+                const float q =
+                    square_to_segment(column_x[i], column_z[i], ax, az, ex, ez, inverse);
                 nearest[i] = q < nearest[i] ? q : nearest[i];
             }
         }
-        for (std::int32_t i = 0; i < kBlock; ++i) {
-            float d = __builtin_sqrtf(nearest[i]) * inverse_half_side;
-            d = d > 1.0F ? 1.0F : d;
-            const float k = d - 1.0F;
-            thickness[first + i] = __builtin_sqrtf(1.0F - k * k) * thick;  // eq. 6
-        }
+    }
+    for (std::int32_t i = 0; i < kTile; ++i) {
+        float d = __builtin_sqrtf(nearest[i]) * inverse_half_side;
+        d = d > 1.0F ? 1.0F : d;
+        const float k = d - 1.0F;
+        thickness[i] = __builtin_sqrtf(1.0F - k * k) * thick;  // eq. 6
     }
 }
 
@@ -209,6 +294,8 @@ const RowKernels kKernels = {.noise = noise,
                              .heights = heights,
                              .flow = flow,
                              .quantise = quantise,
-                             .element_row = element_row};
+                             .blends = blends,
+                             .plain_columns = plain_columns,
+                             .element_tile = element_tile};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -44,14 +44,31 @@ struct HeightConstants {
     float top = 0;         ///< A
 };
 
-/// The polygon of an element as 128 segments; see element_shape.h.
+/// Segments of an element's outline, in kSegmentGroups runs of neighbours. Segment j of run g lies
+/// at [j * kSegmentGroups + g], so that one vector holds the same segment of every run.
+inline constexpr std::int32_t kSegmentGroups = 16;
+inline constexpr std::int32_t kSegmentsPerGroup = 8;
+inline constexpr std::int32_t kSegments = kSegmentGroups * kSegmentsPerGroup;
+
 struct SegmentTable {
-    const float* ax = nullptr;
-    const float* az = nullptr;
-    const float* ex = nullptr;  ///< B - A
-    const float* ez = nullptr;
-    const float* inverse_square = nullptr;  ///< 1 / |e|^2, or 0
-    std::int32_t count = 0;
+    float ax[kSegments];
+    float az[kSegments];
+    float ex[kSegments];  ///< towards the next point
+    float ez[kSegments];
+    float inverse_square[kSegments];  ///< 1 / |e|^2, or 0
+};
+
+/// Elements are rastered in squares of kTileSide columns.
+inline constexpr std::int32_t kTileSide = 4;
+
+/// What the columns of a plain row are made from: planes of a region, see region.h.
+struct PlainRow {
+    const std::int32_t* y256 = nullptr;    ///< layer 0's row; layer k's lies k * plane further
+    const std::int32_t* middle = nullptr;  ///< likewise: where the layer's blend ends
+    const std::int32_t* flow = nullptr;    ///< likewise, or null: no flow
+    std::int64_t plane = 0;
+    std::int64_t flow_plane = 0;
+    std::int32_t layers = 0;
 };
 
 struct RowKernels {
@@ -68,10 +85,18 @@ struct RowKernels {
                  std::int32_t count);
     /// y256[i] = the height in 1/256 voxel.
     void (*quantise)(std::int32_t* y256, const float* height, std::int32_t count);
-    /// thickness[i] of an element over the columns x_first + i of row z; `count` columns, written
-    /// in whole blocks.
-    void (*element_row)(float* thickness, float x_first, float z, std::int32_t count,
-                        const SegmentTable& segments, float inverse_half_side, float thick);
+    /// middle[i] = where the blend of the layer between `bottom` and `top` ends, in 1/256 voxel;
+    /// irregular[i] |= 1 where the layer is not there or its blend reaches its top.
+    void (*blends)(std::int32_t* middle, std::uint8_t* irregular, const std::int32_t* bottom,
+                   const std::int32_t* top, std::int32_t blend, std::int32_t count);
+    /// Limits of `count` columns whose layers all stand and blend regularly: 2 * layers + 1 each,
+    /// in memory as 12 bytes: y256, palette id | flow << 16.
+    void (*plain_columns)(void* limits, const PlainRow& row, std::int32_t first,
+                          std::int32_t count);
+    /// thickness of an element in a tile whose first column is (x, z): kTileSide rows of kTileSide.
+    /// As if the whole plane were inside the outline.
+    void (*element_tile)(float* thickness, float x, float z, const SegmentTable& segments,
+                         float inverse_half_side, float thick);
 };
 
 namespace kernels_scalar {
