@@ -168,8 +168,6 @@ void number_elements(const ColumnWriterOutput& out, const Region& region, const 
     }
 }
 
-}  // namespace
-
 /// Limits a column can have at most: two a layer and one where it begins, three an element, the
 /// void's.
 std::size_t column_limits_max(const Region& region, std::size_t layers) {

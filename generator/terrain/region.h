@@ -43,13 +43,18 @@ struct Region {
     std::int32_t flow_stride = 0;
     std::vector<float> stacked;  ///< S, the top of the stack so far
     std::vector<float> noise;
-    std::vector<float> heights;             ///< K planes of shape.padded_size(): H_k
-    std::vector<std::int32_t> y256;         ///< K planes, likewise: H_k in 1/256 voxel
-    std::vector<std::int32_t> flow;         ///< K planes of the inner columns: x | y << 8 | z << 16
-    std::vector<PlacedElement> elements;    ///< by gap, then in laying order
-    std::vector<std::uint32_t> gap_begin;   ///< first element of each gap; K entries
-    std::vector<float> thickness;           ///< the elements' rasters
-    std::vector<std::uint8_t> has_element;  ///< per column of shape: any element touches it
+    std::vector<float> heights;            ///< K planes of shape.padded_size(): H_k
+    std::vector<std::int32_t> y256;        ///< K planes, likewise: H_k in 1/256 voxel
+    std::vector<std::int32_t> flow;        ///< K planes of the inner columns: x | y << 8 | z << 16
+    std::vector<PlacedElement> elements;   ///< by gap, then in laying order
+    std::vector<std::uint32_t> gap_begin;  ///< first element of each gap; K entries
+    std::vector<float> thickness;          ///< the elements' rasters
+    std::vector<std::uint64_t> gap_mask;   ///< per column of shape: bit g: an element in gap g
+    /// K planes: where each layer's blend into the one right below ends, in 1/256 voxel.
+    std::vector<std::int32_t> middle;
+    /// Per column of shape: not 0 where a layer pinches out, a blend reaches its layer's top, or an
+    /// element stands.
+    std::vector<std::uint8_t> irregular;
 
     NoiseBuffers noise_buffers;
     RasterBuffers raster_buffers;

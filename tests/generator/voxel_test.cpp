@@ -81,8 +81,9 @@ std::vector<Limit> random_column(std::mt19937& random) {
     const int count = 1 + static_cast<int>(random() % 12);
     for (int i = 0; i < count; ++i) {
         const char letter = "abc.AB#"[random() % 7];
-        column.push_back(limit(column.back().y256 + static_cast<std::int32_t>(random() % 1500),
-                               letter, {.x = static_cast<std::int8_t>(random() % 255 - 127U)}));
+        column.push_back(
+            limit(column.back().y256 + static_cast<std::int32_t>(random() % 1500), letter,
+                  {.x = static_cast<std::int8_t>(random() % 255 - 127U), .y = 1, .z = 2}));
     }
     column.push_back(limit(column.back().y256, '.'));
     return column;
