@@ -4,18 +4,19 @@
 // crossing has the same world position in every chunk that shares it.
 #pragma once
 
-#include <cstdint>
 #include <glm/vec3.hpp>
+
+#include <cstdint>
 #include <vector>
 
 namespace terrane {
 
 struct Mesh {
-    std::vector<glm::i32vec3> positions256;   ///< one per vertex
-    std::vector<glm::vec3> normals;           ///< unit length, out of the solid
-    std::vector<glm::u8vec3> colors;          ///< linear light, 0..255
-    std::vector<std::uint8_t> material_ids;   ///< main material, index into the definition
-    std::vector<std::uint32_t> indices;       ///< triangles, counter-clockwise seen from outside
+    std::vector<glm::i32vec3> positions256;  ///< one per vertex
+    std::vector<glm::vec3> normals;          ///< unit length, out of the solid
+    std::vector<glm::u8vec3> colors;         ///< linear light, 0..255
+    std::vector<std::uint8_t> material_ids;  ///< main material, index into the definition
+    std::vector<std::uint32_t> indices;      ///< triangles, counter-clockwise seen from outside
 
     std::size_t vertex_count() const { return positions256.size(); }
 

@@ -1,14 +1,14 @@
 // Worlds of tests/data and generator/worlds, built.
 #pragma once
 
+#include "generator/terrain/world.h"
+#include "generator/world/world_file.h"
+
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <memory>
 #include <string>
-
-#include "generator/terrain/world.h"
-#include "generator/world/world_file.h"
 
 namespace terrane {
 

@@ -1,0 +1,62 @@
+#include "client-sample/cpp/obj.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace terrane {
+
+namespace {
+
+/// IEC 61966-2-1, linear 0..255 to sRGB 0..1.
+double srgb_of(std::uint8_t linear) {
+    const double value = linear / 255.0;
+    return value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
+}
+
+template <typename... Values>
+void append_line(std::string& text, const char* format, Values... values) {
+    std::array<char, 256> line{};
+    const int size = std::snprintf(line.data(), line.size(), format, values...);
+    text.append(line.data(), static_cast<std::size_t>(size));
+}
+
+}  // namespace
+
+std::string obj_of(const Mesh& mesh, ChunkPos key, const ServerHello& world) {
+    const double voxel_m = world.voxel_size_m;
+    const double column_m = voxel_m * static_cast<double>(std::int64_t{1} << key.lod);
+    const double side_m = world.chunk_side * column_m;
+    std::string text;
+    append_line(text, "# Terrane chunk %d/%d/%d/%d, metres, y up\no chunk_%d_%d_%d_%d\n", key.lod,
+                key.x, key.y, key.z, key.lod, key.x, key.y, key.z);
+    for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
+        const auto& p = mesh.positions256[i];
+        append_line(text, "v %.6f %.6f %.6f", key.x * side_m + p.x / 256.0 * column_m,
+                    (static_cast<double>(key.y) * world.chunk_height + p.y / 256.0) * voxel_m,
+                    key.z * side_m + p.z / 256.0 * column_m);
+        if (i < mesh.colors.size()) {
+            const auto& c = mesh.colors[i];
+            append_line(text, " %.4f %.4f %.4f", srgb_of(c.r), srgb_of(c.g), srgb_of(c.b));
+        }
+        text += '\n';
+    }
+    for (const auto& n : mesh.normals) {
+        append_line(text, "vn %.4f %.4f %.4f\n", static_cast<double>(n.x), static_cast<double>(n.y),
+                    static_cast<double>(n.z));
+    }
+    const bool has_normals = mesh.normals.size() == mesh.vertex_count();
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+        const unsigned a = mesh.indices[i] + 1;
+        const unsigned b = mesh.indices[i + 1] + 1;
+        const unsigned c = mesh.indices[i + 2] + 1;
+        if (has_normals) {
+            append_line(text, "f %u//%u %u//%u %u//%u\n", a, a, b, b, c, c);
+        } else {
+            append_line(text, "f %u %u %u\n", a, b, c);
+        }
+    }
+    return text;
+}
+
+}  // namespace terrane

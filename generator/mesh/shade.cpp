@@ -1,0 +1,118 @@
+#include "generator/mesh/shade.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace terrane {
+namespace {
+
+double linear_channel(std::uint8_t value) {
+    const double s = value / 255.0;
+    if (s <= 0.04045) {
+        return s / 12.92;
+    }
+    // x^2.4 = x^2 * (x^2)^(1/5); the fifth root by Newton's steps from above, which only fall.
+    const double x = (s + 0.055) / 1.055;
+    const double square = x * x;
+    double root = 1.0;
+    for (int i = 0; i < 32; ++i) {
+        const double fourth = root * root * root * root;
+        root -= (fourth * root - square) / (5.0 * fourth);
+    }
+    return square * root;
+}
+
+std::uint8_t to_byte(float value) {
+    return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
+}
+
+Shade rounded(LinearColor color, std::uint8_t material) {
+    return {
+        .r = to_byte(color.r), .g = to_byte(color.g), .b = to_byte(color.b), .material = material};
+}
+
+double share_of(const Composition& composition, std::uint16_t material) {
+    double sum = 0;
+    for (const Share& share : composition.shares()) {
+        sum += share.material == material ? share.concentration : 0.0;
+    }
+    return sum;
+}
+
+/// The material with the largest share of (1 - t) * low + t * high; the first of equals.
+std::uint8_t main_material(const Composition& low, const Composition& high, double t) {
+    Share main;
+    for (const Composition* composition : {&low, &high}) {
+        for (const Share& share : composition->shares()) {
+            const double amount =
+                share_of(low, share.material) * (1.0 - t) + share_of(high, share.material) * t;
+            if (amount > main.concentration) {
+                main = {.material = share.material, .concentration = amount};
+            }
+        }
+    }
+    return static_cast<std::uint8_t>(main.material);
+}
+
+}  // namespace
+
+LinearColor linear_color_of(Rgb8 srgb) {
+    return {.r = static_cast<float>(linear_channel(srgb.r)),
+            .g = static_cast<float>(linear_channel(srgb.g)),
+            .b = static_cast<float>(linear_channel(srgb.b))};
+}
+
+std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition) {
+    std::vector<LinearColor> colors;
+    colors.reserve(definition.materials.size());
+    for (const Material& material : definition.materials) {
+        colors.push_back(linear_color_of(material.color));
+    }
+    return colors;
+}
+
+void find_palette_shades(std::vector<PaletteShade>& out, const Palette& palette,
+                         std::span<const LinearColor> material_colors) {
+    out.resize(palette.size());
+    for (std::size_t i = 0; i < palette.size(); ++i) {
+        LinearColor color;
+        Share main;
+        for (const Share& share : palette[i].composition.shares()) {
+            const LinearColor& part = material_colors[share.material];
+            const auto amount = static_cast<float>(share.concentration);
+            color.r += amount * part.r;
+            color.g += amount * part.g;
+            color.b += amount * part.b;
+            main = share.concentration > main.concentration ? share : main;
+        }
+        out[i] = {.color = color,
+                  .shade = rounded(color, static_cast<std::uint8_t>(main.material))};
+    }
+}
+
+Shade shade_at(std::span<const Limit> limits, std::int32_t y256, const Palette& palette,
+               std::span<const PaletteShade> shades) {
+    const auto high = std::find_if(limits.begin(), limits.end(),
+                                   [y256](const Limit& limit) { return limit.y256 >= y256; });
+    if (high == limits.begin()) {
+        return shades[high->palette_id].shade;
+    }
+    const Limit& low = high[-1];
+    if (high == limits.end() || low.palette_id == high->palette_id) {
+        return shades[low.palette_id].shade;
+    }
+    const PaletteShade& from = shades[low.palette_id];
+    const PaletteShade& to = shades[high->palette_id];
+    const float t = static_cast<float>(y256 - low.y256) / static_cast<float>(high->y256 - low.y256);
+    const LinearColor color{.r = from.color.r + t * (to.color.r - from.color.r),
+                            .g = from.color.g + t * (to.color.g - from.color.g),
+                            .b = from.color.b + t * (to.color.b - from.color.b)};
+    if (from.shade.material == to.shade.material) {
+        return rounded(color, from.shade.material);
+    }
+    return rounded(color,
+                   main_material(palette[low.palette_id].composition,
+                                 palette[high->palette_id].composition, static_cast<double>(t)));
+}
+
+}  // namespace terrane

@@ -1,0 +1,94 @@
+#include "generator/mesh/solid_mask.h"
+
+#include "tests/support/ascii_cut.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace terrane {
+namespace {
+
+std::vector<SolidInterval> intervals_of(const SolidColumns& columns, std::size_t x) {
+    const auto span = columns.column(columns.width + x);
+    return {span.begin(), span.end()};
+}
+
+TEST(SolidMask, MergesMaterialsAndParts) {
+    const Letters letters("abV.o");
+    const Stack stack = stack_of_cut(letters, {
+                                                  "......",
+                                                  "bbbb..",
+                                                  "boVb..",
+                                                  "booba.",
+                                                  "aoaaaV",
+                                                  "aaaaaa",
+                                              });
+    SolidColumns columns;
+    find_solid_columns(columns, stack);
+    const auto a = letters.id('a');
+    const auto b = letters.id('b');
+    const auto vein = letters.id('V');
+    using Intervals = std::vector<SolidInterval>;
+    EXPECT_EQ(intervals_of(columns, 0), (Intervals{{kGroundBottom256, 5 * 256, a, b}}));
+    EXPECT_EQ(intervals_of(columns, 1),
+              (Intervals{{kGroundBottom256, 256, a, a}, {4 * 256, 5 * 256, b, b}}));
+    EXPECT_EQ(intervals_of(columns, 2),
+              (Intervals{{kGroundBottom256, 2 * 256, a, a}, {3 * 256, 5 * 256, vein, b}}));
+    EXPECT_EQ(intervals_of(columns, 5), (Intervals{{kGroundBottom256, 2 * 256, a, vein}}));
+    EXPECT_EQ(columns.lowest256, 256);
+    EXPECT_EQ(columns.highest256, 5 * 256);
+}
+
+TEST(SolidMask, TakesTheTopButNotTheBottomOfAnInterval) {
+    const Letters letters("a.o");
+    const Stack stack = stack_of_cut(letters, {"aaaaaa", "oooooo", "aaaaaa"});
+    SolidColumns columns;
+    find_solid_columns(columns, stack);
+    SolidMask mask;
+    fill_solid_mask(mask, columns, -2, 1);
+    // Solid: all up to 1, and 3; the points at 1 and 3 are tops, the one at 2 is a bottom.
+    EXPECT_EQ(mask.row(2, 0)[3], 0b101111U);
+    EXPECT_TRUE(mask.is_solid(3, 2, 1));
+    EXPECT_FALSE(mask.is_solid(3, 2, 2));
+    EXPECT_TRUE(mask.is_solid(3, 2, 3));
+    EXPECT_FALSE(mask.is_solid(3, 2, 4));
+}
+
+TEST(SolidMask, AgreesWithTheLimitsAtEveryPointOfTallColumns) {
+    const Letters letters("ab.o");
+    std::mt19937 random(5);
+    for (int round = 0; round < 20; ++round) {
+        const Stack stack = stack_of_columns({}, 4, letters.palette(), [&](ColumnPos) {
+            std::vector<Limit> column;
+            std::int32_t y256 = 0;
+            std::uint16_t id = letters.id('a');
+            for (int i = 0; i < 12; ++i) {
+                column.push_back({.y256 = y256, .palette_id = id, .flow = {}});
+                y256 += static_cast<std::int32_t>(random() % 6000);
+                column.push_back({.y256 = y256, .palette_id = id, .flow = {}});
+                id = letters.id("abo"[random() % 3]);
+            }
+            column.push_back({.y256 = y256, .palette_id = letters.id('.'), .flow = {}});
+            return column;
+        });
+        SolidColumns columns;
+        find_solid_columns(columns, stack);
+        SolidMask mask;
+        const auto y_first = static_cast<std::int32_t>(random() % 40) - 20;
+        fill_solid_mask(mask, columns, y_first, 4);
+        for (std::int32_t y = y_first; y < y_first + 4 * 64; ++y) {
+            const auto limits = stack.columns.column(2, 3);
+            bool expected = y * 256 <= limits.front().y256;
+            for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
+                if (limits[i].y256 < y * 256 && y * 256 <= limits[i + 1].y256) {
+                    expected = stack.palette[limits[i].palette_id].is_solid();
+                }
+            }
+            EXPECT_EQ(mask.is_solid(3, 4, y), expected) << "y " << y << ", round " << round;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace terrane
