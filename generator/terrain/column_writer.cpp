@@ -3,6 +3,7 @@
 #include "generator/terrain/choose_composition.h"
 
 #include <algorithm>
+#include <span>
 
 namespace terrane {
 namespace {
@@ -45,8 +46,9 @@ struct ColumnSource {
 /// The general walk: elements, pinched layers and materials that are alone.
 class ColumnWalk {
   public:
-    ColumnWalk(Limit* out, const ColumnSource& source, const std::vector<LayerRules>& rules)
-        : first_(out), out_(out), source_(source), rules_(rules) {}
+    ColumnWalk(Limit* out, const ColumnSource& source, const std::vector<LayerRules>& rules,
+               std::span<std::uint16_t> element_ids)
+        : first_(out), out_(out), source_(source), rules_(rules), element_ids_(element_ids) {}
 
     Limit* write(std::int32_t column, std::int32_t row) {
         const Region& region = source_.region;
@@ -97,6 +99,7 @@ class ColumnWalk {
         const bool blends = first_owner && from_ != kNone && own.blend > 0 && !is_cave &&
                             !own.content.alone && !rules_[from_].alone;
         const auto id = static_cast<std::uint16_t>(rules_.size() + 1 + e);
+        element_ids_[e] = 0;
         interval(top, id, is_cave ? Flow{} : source_.flow(k), blends ? own.blend : 0);
     }
 
@@ -132,23 +135,16 @@ class ColumnWalk {
     Limit* out_;
     const ColumnSource& source_;
     const std::vector<LayerRules>& rules_;
+    std::span<std::uint16_t> element_ids_;  ///< kNone, or 0 once the element owns a limit
     std::int32_t bottom_ = 0;
     std::uint16_t from_ = kNone;  ///< the last layer with something of its own below
 };
 
-/// Gives the elements that own limits the ids after the void, in their order.
+/// Gives the elements that own limits the ids after the void, in their order. `element_ids` says
+/// which do, and gets the ids.
 void number_elements(const ColumnWriterOutput& out, const Region& region, const World& world) {
     const std::size_t first_id = world.base_palette.size();
     out.palette.assign(world.base_palette.begin(), world.base_palette.end());
-    if (region.elements.empty()) {
-        return;
-    }
-    out.element_ids.assign(region.elements.size(), kNone);
-    for (const Limit& limit : out.grid.limits) {
-        if (limit.palette_id >= first_id) {
-            out.element_ids[limit.palette_id - first_id] = 0;
-        }
-    }
     bool all_used = true;
     for (std::size_t e = 0; e < region.elements.size(); ++e) {
         if (out.element_ids[e] == kNone) {
@@ -178,8 +174,8 @@ std::size_t column_limits_max(const Region& region, std::size_t layers) {
 class RowWriter {
   public:
     RowWriter(const Region& region, const std::vector<LayerRules>& rules, const RowKernels& kernels,
-              std::int32_t z)
-        : region_(region), rules_(rules), kernels_(kernels), z_(z) {
+              std::span<std::uint16_t> element_ids, std::int32_t z)
+        : region_(region), rules_(rules), kernels_(kernels), element_ids_(element_ids), z_(z) {
         const auto shape_row = static_cast<std::ptrdiff_t>(z + 1) * region.shape.stride();
         plain_.y256 = region.y256.data() + shape_row;
         plain_.middle = region.middle.data() + shape_row;
@@ -217,7 +213,7 @@ class RowWriter {
                 .at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1),
                 .flow_at = has_flow ? static_cast<std::size_t>(z_ * region_.flow_stride + x) : 0,
                 .has_flow = has_flow};
-            out = ColumnWalk(out, source, rules_).write(x + 1, z_ + 1);
+            out = ColumnWalk(out, source, rules_, element_ids_).write(x + 1, z_ + 1);
             *end_of++ = static_cast<std::uint32_t>(out - base);
             ++x;
         }
@@ -228,6 +224,7 @@ class RowWriter {
     const Region& region_;
     const std::vector<LayerRules>& rules_;
     const RowKernels& kernels_;
+    std::span<std::uint16_t> element_ids_;
     std::int32_t z_;
     PlainRow plain_;
     const std::uint8_t* irregular_ = nullptr;
@@ -262,6 +259,7 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
     grid.offsets[0] = 0;
     const std::size_t row_limits_max =
         row_columns * column_limits_max(region, constants.rules.size());
+    out.element_ids.assign(region.elements.size(), kNone);
     std::size_t used = 0;
     std::uint32_t* end_of = grid.offsets.data() + 1;
     for (std::int32_t z = -apron; z < length + apron; ++z) {
@@ -270,7 +268,7 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
         }
         Limit* const base = grid.limits.data();
         Limit* at = base + used;
-        RowWriter row(region, constants.rules, kernels, z);
+        RowWriter row(region, constants.rules, kernels, out.element_ids, z);
         if (z < 0 || z >= length) {
             at = row.write(at, -apron, width + apron, false, end_of, base);
         } else {
