@@ -30,7 +30,11 @@ class CollectingReporter : public benchmark::ConsoleReporter {
     CollectingReporter() : ConsoleReporter(OO_Tabular) {}
 
     void ReportRuns(const std::vector<Run>& runs) override {
+        std::vector<Run> shown;
         for (const Run& run : runs) {
+            if (run.run_type == Run::RT_Aggregate && run.aggregate_name == "median") {
+                shown.push_back(run);
+            }
             if (run.run_type != Run::RT_Iteration || run.error_occurred) {
                 continue;
             }
@@ -39,9 +43,14 @@ class CollectingReporter : public benchmark::ConsoleReporter {
                 rate != run.counters.end() && rate->second.value > 0
                     ? 1 / rate->second.value
                     : run.real_accumulated_time / static_cast<double>(run.iterations);
-            times_[run.run_name.str()].push_back(seconds);
+            // Without the repetition count that str() appends.
+            const std::string& arguments = run.run_name.args;
+            times_[run.run_name.function_name + (arguments.empty() ? "" : "/" + arguments)]
+                .push_back(seconds);
         }
-        ConsoleReporter::ReportRuns(runs);
+        if (!shown.empty()) {
+            ConsoleReporter::ReportRuns(shown);
+        }
     }
 
     /// Median seconds an item; 0 if the benchmark did not run.
@@ -96,9 +105,9 @@ bool print_ratios(const CollectingReporter& reporter, nlohmann::json& json) {
 int run(const std::vector<char*>& arguments) {
     std::string json_path;
     bool check = false;
-    std::vector<std::string> defaults = {
-        "--benchmark_repetitions=9", "--benchmark_enable_random_interleaving=true",
-        "--benchmark_display_aggregates_only=true", "--benchmark_min_time=0.05"};
+    std::vector<std::string> defaults = {"--benchmark_repetitions=9",
+                                         "--benchmark_enable_random_interleaving=true",
+                                         "--benchmark_min_time=0.05"};
     std::vector<char*> rest = {arguments[0]};
     for (std::string& flag : defaults) {
         rest.push_back(flag.data());
