@@ -1,4 +1,5 @@
-// A mutex that clang's -Wthread-safety understands, so that what it guards is written down and checked.
+// A mutex that clang's -Wthread-safety understands, so that what it guards is written down and
+// checked.
 #pragma once
 
 #include <condition_variable>
@@ -38,6 +39,11 @@ class TERRANE_THREAD_ANNOTATION(scoped_lockable) MutexLock {
     MutexLock& operator=(const MutexLock&) = delete;
 
     void wait(std::condition_variable_any& condition) { condition.wait(mutex_); }
+
+    template <typename TimePoint>
+    void wait_until(std::condition_variable_any& condition, TimePoint deadline) {
+        condition.wait_until(mutex_, deadline);
+    }
 
   private:
     Mutex& mutex_;

@@ -19,7 +19,7 @@ inline constexpr std::size_t kKeysPerRequestMax = 64;
 inline constexpr std::size_t kKeysInFlightPerSessionMax = 1024;
 inline constexpr std::size_t kRequestsPerCancelMax = 1024;
 
-inline constexpr std::size_t kNameBytesMax = 256;
+inline constexpr std::size_t kWireNameBytesMax = 256;
 inline constexpr std::size_t kTokenBytesMax = 4096;
 inline constexpr std::size_t kTextBytesMax = 4096;  ///< a Failure's message, a Goodbye's reason
 inline constexpr std::size_t kWorldTextBytesMax = std::size_t{1} << 20U;

@@ -83,7 +83,7 @@ Result<WireComposition> composition_of(const wire::Composition* composition) {
 }
 
 Result<AnyMessage> read(const wire::ClientHello& table) {
-    auto name = text_of(table.client_name(), kNameBytesMax, "ClientHello.client_name");
+    auto name = text_of(table.client_name(), kWireNameBytesMax, "ClientHello.client_name");
     auto token = text_of(table.token(), kTokenBytesMax, "ClientHello.token");
     if (!name || !token) {
         return tl::unexpected(!name ? name.error() : token.error());
@@ -112,8 +112,8 @@ Result<AnyMessage> read(const wire::ClientHello& table) {
 }
 
 Result<WireMaterial> material_of(const wire::Material& table) {
-    auto name = text_of(table.name(), kNameBytesMax, "ServerHello.materials.name");
-    auto texture = text_of(table.texture(), kNameBytesMax, "ServerHello.materials.texture");
+    auto name = text_of(table.name(), kWireNameBytesMax, "ServerHello.materials.name");
+    auto texture = text_of(table.texture(), kWireNameBytesMax, "ServerHello.materials.texture");
     if (!name || !texture) {
         return tl::unexpected(!name ? name.error() : texture.error());
     }
@@ -151,8 +151,8 @@ Result<AnyMessage> read(const wire::ServerHello& table) {
         return tl::unexpected(checked.error());
     }
     auto server_version =
-        text_of(table.server_version(), kNameBytesMax, "ServerHello.server_version");
-    auto world_name = text_of(table.world_name(), kNameBytesMax, "ServerHello.world_name");
+        text_of(table.server_version(), kWireNameBytesMax, "ServerHello.server_version");
+    auto world_name = text_of(table.world_name(), kWireNameBytesMax, "ServerHello.world_name");
     if (!server_version || !world_name) {
         return tl::unexpected(!server_version ? server_version.error() : world_name.error());
     }

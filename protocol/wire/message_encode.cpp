@@ -93,7 +93,7 @@ using OffsetTarget = decltype(target_of(std::declval<T>()));
 
 Offset<wire::ClientHello> write(FlatBufferBuilder& builder, const ClientHello& hello) {
     TERRANE_ASSERT(hello.formats.size() <= kFormatsMax);
-    const auto name = text_of(builder, hello.client_name, kNameBytesMax);
+    const auto name = text_of(builder, hello.client_name, kWireNameBytesMax);
     const auto token = text_of(builder, hello.token, kTokenBytesMax);
     std::vector<wire::Format> formats;
     std::ranges::transform(hello.formats, std::back_inserter(formats),
@@ -106,8 +106,8 @@ Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& h
     TERRANE_ASSERT(hello.materials.size() <= kWireMaterialsMax);
     std::vector<Offset<wire::Material>> materials;
     for (const WireMaterial& material : hello.materials) {
-        const auto name = text_of(builder, material.name, kNameBytesMax);
-        const auto texture = text_of(builder, material.texture, kNameBytesMax);
+        const auto name = text_of(builder, material.name, kWireNameBytesMax);
+        const auto texture = text_of(builder, material.texture, kWireNameBytesMax);
         materials.push_back(
             wire::CreateMaterial(builder, name, material.color_rgb, texture, material.solid));
     }
@@ -116,8 +116,8 @@ Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& h
     const auto limits_at =
         wire::CreateLimits(builder, limits.keys_per_request_max, limits.keys_in_flight_max,
                            limits.inbound_frame_bytes_max, limits.payload_bytes_max);
-    const auto server_version = text_of(builder, hello.server_version, kNameBytesMax);
-    const auto world_name = text_of(builder, hello.world_name, kNameBytesMax);
+    const auto server_version = text_of(builder, hello.server_version, kWireNameBytesMax);
+    const auto world_name = text_of(builder, hello.world_name, kWireNameBytesMax);
     const wire::Hash fingerprint = wire_of(hello.fingerprint);
     const wire::Hash content_id = wire_of(hello.content_id);
     return wire::CreateServerHello(builder, hello.protocol_version, server_version,

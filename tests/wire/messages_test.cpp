@@ -168,7 +168,7 @@ TEST(Messages, NumbersThatAreNotFiniteAreMalformed) {
 }
 
 TEST(Messages, LongOrUnprintableClientNamesAreMalformed) {
-    for (const std::string& name : {std::string(kNameBytesMax + 1, 'a'), std::string("a\nb")}) {
+    for (const std::string& name : {std::string(kWireNameBytesMax + 1, 'a'), std::string("a\nb")}) {
         const auto message = decode_built([&name](auto& builder) {
             const auto name_at = builder.CreateString(name);
             return std::pair(wire::Body::ClientHello,

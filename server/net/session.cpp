@@ -1,0 +1,359 @@
+#include "server/net/session.h"
+
+#include "protocol/wire/limits.h"
+
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+namespace terrane {
+
+namespace {
+
+/// Bytes of a Chunk's head, which the answers under way will need beside their payloads.
+constexpr std::size_t kHeadBytes = 128;
+
+WireComposition wire_of(const Composition& composition) {
+    WireComposition out;
+    for (const Share& share : composition.shares()) {
+        out.push_back({.material = share.material, .concentration = share.concentration});
+    }
+    return out;
+}
+
+}  // namespace
+
+Session::Session(const SessionContext& context, Post post, Clock::time_point now)
+    : context_(context),
+      post_(std::move(post)),
+      connected_(now),
+      last_input_(now),
+      last_frame_(now) {}
+
+void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
+    last_input_ = now;
+    ping_sent_ = false;
+    if (reader_.buffered_bytes() == 0) {
+        last_frame_ = now;
+    }
+    reader_.feed(bytes);
+    process(now);
+}
+
+void Session::written(std::size_t size_bytes, Clock::time_point now) {
+    write_waits_since_.reset();
+    outbox_.consume(size_bytes);
+    submit();
+    process(now);
+}
+
+bool Session::wants_input() const {
+    return (stage_ == Stage::hello || stage_ == Stage::open) && !outbox_.full();
+}
+
+void Session::process(Clock::time_point now) {
+    while (wants_input()) {
+        const auto frame = reader_.next();
+        if (!frame) {
+            close_with(frame.error());
+            return;
+        }
+        if (!*frame) {
+            return;
+        }
+        last_frame_ = now;
+        const auto message = decode_message(**frame);
+        if (message) {
+            handle(*message);
+        } else if (message.error().code == ErrorCode::malformed || stage_ == Stage::hello) {
+            close_with(message.error());
+        } else {
+            fail_request(request_id_of(**frame), message.error());
+        }
+    }
+}
+
+void Session::handle(const AnyMessage& message) {
+    const bool is_hello = std::holds_alternative<ClientHello>(message);
+    if (is_hello != (stage_ == Stage::hello)) {
+        const std::string name(name_of(message));
+        close_with({.code = ErrorCode::malformed,
+                    .message = is_hello ? "ClientHello comes once"
+                                        : "ClientHello comes first, not " + name});
+        return;
+    }
+    std::visit([this](const auto& body) { handle_one(body); }, message);
+}
+
+void Session::handle_one(const ClientHello& hello) {
+    client_name_ = hello.client_name;
+    if (hello.protocol_version != kProtocolVersion) {
+        close_with({.code = ErrorCode::version_mismatch,
+                    .message = "protocol version " + std::to_string(hello.protocol_version) +
+                               ": this server speaks " + std::to_string(kProtocolVersion)});
+        return;
+    }
+    stage_ = Stage::open;
+    send(context_.hello);
+}
+
+void Session::handle_one(const ChunkRequest& request) {
+    for (std::size_t i = 0; i < request.keys.size(); ++i) {
+        add({.request_id = request.request_id,
+             .key = ChunkKey{.position = request.keys[i],
+                             .format = request.format,
+                             .without_flow = request.without_flow},
+             .known_etag = request.known_etags.empty() ? Hash128{} : request.known_etags[i],
+             .priority = request.priority});
+    }
+    submit();
+}
+
+void Session::handle_one(const ChunkCancel& cancel) {
+    const std::unordered_set<std::uint32_t> ids(cancel.request_ids.begin(),
+                                                cancel.request_ids.end());
+    std::vector<Wish> cancelled;
+    for (auto at = waiting_.begin(); at != waiting_.end();) {
+        if (ids.contains(at->second.request_id)) {
+            cancelled.push_back(std::move(at->second));
+            at = waiting_.erase(at);
+        } else {
+            ++at;
+        }
+    }
+    for (auto at = under_way_.begin(); at != under_way_.end();) {
+        if (ids.contains(at->second.request_id)) {
+            context_.service->cancel(at->second.key, at->first);
+            cancelled.push_back(std::move(at->second));
+            at = under_way_.erase(at);
+        } else {
+            ++at;
+        }
+    }
+    for (const Wish& wish : cancelled) {
+        fail_wish(wish, {.code = ErrorCode::cancelled, .message = "cancelled as asked"});
+    }
+    submit();
+}
+
+void Session::handle_one(const ColumnQuery& query) {
+    add({.request_id = query.request_id, .key = query.column, .known_etag = {}, .priority = 0});
+    submit();
+}
+
+void Session::handle_one(const WorldQuery& query) {
+    send(WorldAnswer{.request_id = query.request_id,
+                     .toml = context_.world_file,
+                     .fingerprint = context_.hello.fingerprint});
+}
+
+void Session::handle_one(const Ping& ping) {
+    send(Pong{.nonce = ping.nonce});
+}
+
+void Session::handle_one(const Pong&) {}  // that it came is all that matters
+
+void Session::handle_one(const Goodbye&) {
+    stage_ = Stage::dead;
+}
+
+template <typename Other>
+void Session::handle_one(const Other& other) {
+    close_with({.code = ErrorCode::malformed,
+                .message = std::string(name_of(AnyMessage(other))) + " is a server's to send"});
+}
+
+void Session::add(Wish wish) {
+    if (waiting_.size() + under_way_.size() >= kKeysInFlightPerSessionMax) {
+        fail_wish(wish, {.code = ErrorCode::busy,
+                         .message = std::to_string(kKeysInFlightPerSessionMax) +
+                                    " keys of this session are in flight, which is the most"});
+        return;
+    }
+    const Rank rank{.urgency = -static_cast<std::int64_t>(wish.priority),
+                    .sequence = next_sequence_++};
+    waiting_.emplace(rank, std::move(wish));
+}
+
+bool Session::has_room() const {
+    if (under_way_.empty()) {
+        return !outbox_.full();
+    }
+    const std::size_t expected = (under_way_.size() + 1) * (expected_bytes_ + kHeadBytes);
+    return under_way_.size() < kWishesUnderWayMax && outbox_.bytes() + expected <= kOutboxBytesMax;
+}
+
+void Session::submit() {
+    if (stage_ != Stage::open && stage_ != Stage::finishing) {
+        return;
+    }
+    while (!waiting_.empty() && has_room()) {
+        Wish wish = std::move(waiting_.begin()->second);
+        waiting_.erase(waiting_.begin());
+        const WaiterId id = context_.service->new_waiter_id();
+        AnswerCallback callback = [post = post_, weak = weak_from_this(),
+                                   id](const Result<Answer>& result) {
+            post([weak, id, result] {
+                if (const auto self = weak.lock()) {
+                    self->deliver(id, result);
+                }
+            });
+        };
+        const auto outcome = context_.service->request(wish.key, wish.priority,
+                                                       {.id = id, .answer = std::move(callback)});
+        if (!outcome) {
+            fail_wish(wish, outcome.error());
+        } else if (*outcome) {
+            answer(wish, **outcome);
+        } else {
+            under_way_.emplace(id, std::move(wish));
+        }
+    }
+    finish_if_done();
+}
+
+void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
+    const auto found = under_way_.find(waiter);
+    if (found == under_way_.end()) {
+        return;  // cancelled in the meantime
+    }
+    const Wish wish = std::move(found->second);
+    under_way_.erase(found);
+    answer(wish, result);
+    submit();
+}
+
+void Session::answer(const Wish& wish, const Result<Answer>& result) {
+    if (!result) {
+        fail_wish(wish, result.error());
+    } else if (const auto* chunk = std::get_if<ServedChunk>(&*result)) {
+        answer_chunk(wish, *chunk);
+    } else {
+        answer_column(wish, std::get<ServedColumn>(*result));
+    }
+}
+
+void Session::answer_chunk(const Wish& wish, const ServedChunk& served) {
+    const EncodedChunk& chunk = *served.chunk;
+    const bool is_known = wish.known_etag != Hash128{} && wish.known_etag == chunk.etag;
+    ChunkAnswer head{.request_id = wish.request_id,
+                     .key = served.key.position,
+                     .format = served.key.format,
+                     .status = is_known ? ChunkStatus::not_modified : chunk.status,
+                     .source = served.source,
+                     .etag = chunk.etag,
+                     .timings = served.timings,
+                     .payload_bytes = 0,
+                     .uniform = {}};
+    if (is_known) {
+        send(head);
+        return;
+    }
+    head.payload_bytes = static_cast<std::uint32_t>(chunk.payload_bytes());
+    if (chunk.status == ChunkStatus::uniform) {
+        head.uniform = wire_of(chunk.uniform);
+    }
+    // An exponential mean over about eight answers.
+    expected_bytes_ = (expected_bytes_ * 7 + chunk.payload_bytes()) / 8;
+    send(head, chunk.payload);
+}
+
+void Session::answer_column(const Wish& wish, const ServedColumn& column) {
+    ColumnAnswer message{.request_id = wish.request_id, .column = column.column, .limits = {}};
+    message.limits.reserve(column.limits->size());
+    for (const ColumnLimit& limit : *column.limits) {
+        message.limits.push_back({.y256 = limit.y256,
+                                  .flow_x = limit.flow.x,
+                                  .flow_y = limit.flow.y,
+                                  .flow_z = limit.flow.z,
+                                  .composition = wire_of(limit.composition)});
+    }
+    send(message);
+}
+
+void Session::fail_wish(const Wish& wish, Error error) {
+    Failure failure{.request_id = wish.request_id,
+                    .error = std::move(error),
+                    .retry_after_ms = 0,
+                    .key = std::nullopt};
+    if (failure.error.code == ErrorCode::busy) {
+        failure.retry_after_ms = context_.service->retry_after_ms();
+    }
+    if (const auto* chunk = std::get_if<ChunkKey>(&wish.key)) {
+        failure.key = chunk->position;
+    }
+    send(failure);
+}
+
+void Session::fail_request(std::uint32_t request_id, Error error) {
+    send(Failure{.request_id = request_id,
+                 .error = std::move(error),
+                 .retry_after_ms = 0,
+                 .key = std::nullopt});
+}
+
+void Session::close_with(Error error) {
+    close_reason_ = std::string(to_string(error.code)) + ": " + error.message;
+    fail_request(0, std::move(error));
+    stage_ = Stage::closing;
+}
+
+void Session::send(const AnyMessage& message, SharedBytes payload) {
+    if (stage_ != Stage::closing && stage_ != Stage::dead) {
+        outbox_.push(encode_message(message), std::move(payload));
+    }
+}
+
+void Session::tick(Clock::time_point now) {
+    const SessionTimeouts& limits = context_.timeouts;
+    if (outbox_.empty()) {
+        write_waits_since_.reset();
+    } else if (!write_waits_since_) {
+        write_waits_since_ = now;
+    } else if (now - *write_waits_since_ > limits.stall) {
+        close_reason_ = "the client does not read";
+        stage_ = Stage::dead;
+        return;
+    }
+    if (!wants_input()) {
+        return;
+    }
+    if (stage_ == Stage::hello && now - connected_ > limits.hello) {
+        close_with({.code = ErrorCode::malformed, .message = "no ClientHello in time"});
+    } else if (reader_.buffered_bytes() > 0 && now - last_frame_ > limits.stall) {
+        close_with({.code = ErrorCode::malformed, .message = "a frame was not ended in time"});
+    } else if (now - last_input_ > limits.idle && under_way_.empty()) {
+        close_reason_ = "silent for too long";
+        send(Goodbye{.code = std::nullopt, .reason = close_reason_});
+        stage_ = Stage::closing;
+    } else if (now - last_input_ > limits.ping && !ping_sent_ && stage_ == Stage::open) {
+        ping_sent_ = true;
+        send(Ping{.nonce = next_sequence_});
+    }
+}
+
+void Session::drain() {
+    if (stage_ == Stage::hello || stage_ == Stage::open) {
+        close_reason_ = "the server is shutting down";
+        send(Goodbye{.code = ErrorCode::draining, .reason = close_reason_});
+        stage_ = Stage::finishing;
+        finish_if_done();
+    }
+}
+
+void Session::finish_if_done() {
+    if (stage_ == Stage::finishing && waiting_.empty() && under_way_.empty()) {
+        stage_ = Stage::closing;
+    }
+}
+
+void Session::end() {
+    for (const auto& [waiter, wish] : under_way_) {
+        context_.service->cancel(wish.key, waiter);
+    }
+    under_way_.clear();
+    waiting_.clear();
+    stage_ = Stage::dead;
+}
+
+}  // namespace terrane

@@ -1,0 +1,151 @@
+// One client's session, from its hello to its goodbye, without a socket: bytes in, an outbox out,
+// the time given. A transport (tcp_listener.cpp) feeds it, writes the outbox and closes when told.
+//
+//     hello ──ClientHello──> open ──drain──> finishing ──last answer──> closing ──> dead
+//       └──── malformed, too late, wrong version ─────────────────────────┘
+//
+// Wishes (keys and columns) wait in the session, most urgent first. They go to the service only
+// while the outbox, with the answers expected for what is under way, has room: a client that
+// doesn't read makes no work and holds little memory. Answers come back through `post` on the
+// session's own thread.
+#pragma once
+
+#include "protocol/wire/frame.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/chunk_service.h"
+#include "server/net/outbox.h"
+
+#include <chrono>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+
+namespace terrane {
+
+/// Of one session's wishes, handed to the service at one time. The others wait in the session, so
+/// that no client fills the work queue.
+inline constexpr std::size_t kWishesUnderWayMax = 128;
+
+struct SessionTimeouts {
+    std::chrono::milliseconds hello{10'000};  ///< connected, and no ClientHello yet
+    std::chrono::milliseconds stall{30'000};  ///< a frame begun and not ended; a write that stands
+    std::chrono::milliseconds ping{30'000};   ///< silent: asked whether it is still there
+    std::chrono::milliseconds idle{60'000};   ///< silent for so long: gone
+};
+
+/// What all sessions of a server share; outlives them, and is used from any thread.
+struct SessionContext {
+    ChunkService* service = nullptr;
+    ServerHello hello;
+    std::string world_file;  ///< canonical
+    SessionTimeouts timeouts;
+};
+
+/// All calls on one thread, the session's. Made by `std::make_shared`.
+class Session : public std::enable_shared_from_this<Session> {
+  public:
+    using Clock = std::chrono::steady_clock;
+    /// Runs a function on the session's thread, some time later; callable from any thread.
+    using Post = std::function<void(std::function<void()>)>;
+
+    /// `context` outlives the session.
+    Session(const SessionContext& context, Post post, Clock::time_point now);
+
+    /// Bytes from the client. All of them are kept, so call it only while `wants_input`.
+    void receive(std::span<const std::byte> bytes, Clock::time_point now);
+    /// The first bytes of the outbox have been written.
+    void written(std::size_t size_bytes, Clock::time_point now);
+    /// Looks at the deadlines; about once a second.
+    void tick(Clock::time_point now);
+    /// Says Goodbye{draining}; takes no new requests, answers what is under way, then closes.
+    void drain();
+    /// The connection is gone: cancels what it waits for. Only the destructor may follow.
+    void end();
+
+    const Outbox& outbox() const { return outbox_; }
+
+    bool wants_input() const;
+
+    /// Nothing more will come: write what is left, then close.
+    bool is_closing() const { return stage_ == Stage::closing; }
+
+    /// Close at once, whatever is left.
+    bool is_dead() const { return stage_ == Stage::dead; }
+
+    /// Who it says it is; for logs.
+    const std::string& client_name() const { return client_name_; }
+
+    /// Why the session closes, for logs; empty for a client that just left.
+    const std::string& close_reason() const { return close_reason_; }
+
+  private:
+    enum class Stage : std::uint8_t { hello, open, finishing, closing, dead };
+
+    /// One key or column that has no answer yet.
+    struct Wish {
+        std::uint32_t request_id = 0;
+        WorkKey key;
+        Hash128 known_etag;  ///< zero: none
+        std::int32_t priority = 0;
+    };
+
+    struct Rank {
+        std::int64_t urgency = 0;  ///< the priority negated
+        std::uint64_t sequence = 0;
+
+        friend auto operator<=>(const Rank&, const Rank&) = default;
+    };
+
+    void process(Clock::time_point now);
+    void handle(const AnyMessage& message);
+    void handle_one(const ClientHello& hello);
+    void handle_one(const ChunkRequest& request);
+    void handle_one(const ChunkCancel& cancel);
+    void handle_one(const ColumnQuery& query);
+    void handle_one(const WorldQuery& query);
+    void handle_one(const Ping& ping);
+    void handle_one(const Pong& pong);
+    void handle_one(const Goodbye& goodbye);
+    /// Every other kind is a server's to send.
+    template <typename Other>
+    void handle_one(const Other& other);
+
+    void add(Wish wish);
+    void submit();
+    bool has_room() const;
+    void deliver(WaiterId waiter, const Result<Answer>& result);
+    void answer(const Wish& wish, const Result<Answer>& result);
+    void answer_chunk(const Wish& wish, const ServedChunk& served);
+    void answer_column(const Wish& wish, const ServedColumn& column);
+    void fail_wish(const Wish& wish, Error error);
+    void fail_request(std::uint32_t request_id, Error error);
+    void close_with(Error error);
+    void send(const AnyMessage& message, SharedBytes payload = nullptr);
+    void finish_if_done();
+
+    const SessionContext& context_;
+    const Post post_;
+    Stage stage_ = Stage::hello;
+    FrameReader reader_{kInboundFrameLimits};
+    Outbox outbox_;
+    std::map<Rank, Wish> waiting_;
+    std::unordered_map<WaiterId, Wish> under_way_;
+    std::uint64_t next_sequence_ = 0;
+    std::size_t expected_bytes_ = 4096;  ///< mean of the answers so far; the start is a guess
+    std::string client_name_;
+    std::string close_reason_;
+    const Clock::time_point connected_;
+    Clock::time_point last_input_;
+    Clock::time_point last_frame_;  ///< ended, or the next one's first bytes
+    std::optional<Clock::time_point> write_waits_since_;
+    bool ping_sent_ = false;
+};
+
+}  // namespace terrane

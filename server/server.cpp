@@ -1,0 +1,195 @@
+#include "server/server.h"
+
+#include "generator/mesh/draco_codec.h"
+#include "generator/world/world_file.h"
+#include "protocol/wire/limits.h"
+#include "server/chunks/build_chunk.h"
+#include "storage/memory_store.h"
+#include "storage/rocksdb_store.h"
+
+#include <sys/resource.h>
+
+#include <string>
+#include <utility>
+
+namespace terrane {
+
+namespace {
+
+constexpr const char* kServerVersion = "0.1.0";
+/// A worker's generator, mesher and encoder; the largest allowed stack (64 x 64 columns of a few
+/// hundred limits) takes about a third of it.
+constexpr std::size_t kWorkerScratchBytes = std::size_t{32} << 20U;
+/// A session's own objects and read buffer, without outbox and frame.
+constexpr std::size_t kSessionBytes = std::size_t{8} << 10U;
+/// An entry of the in-flight table with its key, and a waiter with its callback; measured by sizeof
+/// and the nodes around them.
+constexpr std::size_t kKeyInFlightBytes = 400;
+constexpr std::size_t kWaiterBytes = 200;
+
+Result<std::unique_ptr<ChunkStore>> open_store(const ServerOptions& options, const Log& log) {
+    const World& world = *options.world;
+    const StoreIdentity identity{.fingerprint = world.fingerprint,
+                                 .content_id = content_id_of(world),
+                                 .generator_version = kGeneratorVersion,
+                                 .world_name = world.definition.name};
+    if (options.store == StoreKind::memory) {
+        return std::make_unique<MemoryStore>(identity);
+    }
+    RocksdbOptions rocksdb;
+    rocksdb.on_notice = [&log](std::string_view notice) { log.warning(notice); };
+    return open_rocksdb_store(options.data_directory, identity, rocksdb);
+}
+
+ServerHello hello_of(const World& world) {
+    const WorldDefinition& definition = world.definition;
+    ServerHello hello{.protocol_version = kProtocolVersion,
+                      .server_version = kServerVersion,
+                      .generator_version = kGeneratorVersion,
+                      .encoding_version = kEncodingVersion,
+                      .world_name = definition.name,
+                      .fingerprint = world.fingerprint,
+                      .content_id = content_id_of(world),
+                      .chunk_side = definition.grid.side,
+                      .chunk_height = definition.grid.height,
+                      .voxel_size_m = definition.grid.voxel_size_m,
+                      .levels = levels_supported(),
+                      .height_bound_voxels = world.stack.height_bound,
+                      .materials = {},
+                      .limits = {.keys_per_request_max = kKeysPerRequestMax,
+                                 .keys_in_flight_max = kKeysInFlightPerSessionMax,
+                                 .inbound_frame_bytes_max = kInboundFrameBytesMax,
+                                 .payload_bytes_max = kPayloadBytesMax}};
+    for (const Material& material : definition.materials) {
+        const Rgb8 color = material.color;
+        hello.materials.push_back(
+            {.name = material.name,
+             .color_rgb =
+                 (std::uint32_t{color.r} << 16U) | (std::uint32_t{color.g} << 8U) | color.b,
+             .texture = material.texture,
+             .solid = material.kind != MaterialKind::void_ && material.kind != MaterialKind::cave});
+    }
+    return hello;
+}
+
+}  // namespace
+
+MemoryBound memory_bound_of(const ServerOptions& options) {
+    const ServiceOptions service;
+    const RocksdbOptions rocksdb;
+    return {.caches = options.cache_bytes_max + options.stack_cache_bytes_max,
+            .store = options.store == StoreKind::memory
+                         ? kMemoryStoreBytesMax
+                         : rocksdb.block_cache_bytes + rocksdb.write_buffer_bytes,
+            .workers = options.workers * kWorkerScratchBytes,
+            .sessions = options.listen.sessions_max *
+                        (kOutboxBytesMax + kInboundFrameBytesMax + kSessionBytes),
+            .queue = service.keys_in_flight_max * kKeyInFlightBytes +
+                     service.waiters_max * kWaiterBytes};
+}
+
+std::size_t raise_descriptor_limit() {
+    rlimit limit{};
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) {
+        return 0;
+    }
+    if (limit.rlim_cur < limit.rlim_max) {
+        rlimit raised = limit;
+        raised.rlim_cur = limit.rlim_max;
+        if (setrlimit(RLIMIT_NOFILE, &raised) == 0) {
+            limit = raised;
+        }
+    }
+    return limit.rlim_cur;
+}
+
+/// In order of construction; `stop` ends them in reverse.
+struct Server::Impl {
+    Impl(const ServerOptions& options, const Log& server_log, std::unique_ptr<ChunkStore> opened)
+        : log(server_log),
+          world(options.world),
+          store(std::move(opened)),
+          stacks(options.stack_cache_bytes_max),
+          service({.workers = options.workers,
+                   .cache_bytes_max = options.cache_bytes_max,
+                   .side_columns = options.world->definition.grid.side},
+                  counters,
+                  [this] {
+                      auto builder = std::make_shared<ChunkBuilder>(BuildContext{
+                          .world = world.get(),
+                          .store = store.get(),
+                          .stacks = &stacks,
+                          .counters = &counters,
+                          .on_notice = [this](std::string_view notice) { log.warning(notice); }});
+                      return [builder = std::move(builder)](const Task& task) {
+                          return builder->build(task);
+                      };
+                  }),
+          sessions{.service = &service,
+                   .hello = hello_of(*world),
+                   .world_file = canonical_world_file(world->definition),
+                   .timeouts = options.timeouts} {}
+
+    const Log& log;
+    const std::shared_ptr<const World> world;
+    const std::unique_ptr<ChunkStore> store;
+    ServiceCounters counters;
+    StackCache stacks;
+    ChunkService service;
+    SessionContext sessions;
+    std::unique_ptr<TcpListener> listener;
+};
+
+Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, const Log& log) {
+    auto store = open_store(options, log);
+    if (!store) {
+        return tl::unexpected(store.error());
+    }
+    auto impl = std::make_unique<Impl>(options, log, *std::move(store));
+    ListenOptions listen = options.listen;
+    if (!listen.on_event) {
+        listen.on_event = [&log](std::string_view event) { log.debug(event); };
+    }
+    auto listener = TcpListener::open(listen, impl->sessions);
+    if (!listener) {
+        return tl::unexpected(listener.error());
+    }
+    impl->listener = *std::move(listener);
+    return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Server::~Server() {
+    stop(std::chrono::milliseconds{0});
+}
+
+Endpoint Server::endpoint() const {
+    return impl_->listener->endpoint();
+}
+
+const ServiceCounters& Server::counters() const {
+    return impl_->counters;
+}
+
+std::size_t Server::sessions() const {
+    return impl_->listener ? impl_->listener->sessions() : 0;
+}
+
+void Server::stop(std::chrono::milliseconds drain_time) {
+    if (!impl_->listener) {
+        return;
+    }
+    if (!impl_->listener->drain(drain_time)) {
+        impl_->log.warning("sessions that did not end in time are closed",
+                           {{"sessions", std::uint64_t{impl_->listener->sessions()}}});
+    }
+    // Workers first: their last answers are posted to the listener's loops.
+    impl_->service.stop();
+    impl_->listener.reset();
+    if (const auto flushed = impl_->store->flush(); !flushed) {
+        impl_->log.error("the store could not be flushed: " + flushed.error().message);
+    }
+}
+
+}  // namespace terrane
