@@ -37,8 +37,7 @@ std::uint16_t void_id_of(const Palette& palette) {
 
 /// Appends the last limit at or below lo, those between, and the first at or above hi; the void at
 /// hi where nothing is that high.
-void append_cut(Limits& out, std::span<const Limit> column, Span256 span,
-                std::uint16_t void_id) {
+void append_cut(Limits& out, std::span<const Limit> column, Span256 span, std::uint16_t void_id) {
     TERRANE_ASSERT(!column.empty());
     std::size_t first = 0;
     while (first + 1 < column.size() && column[first + 1].y256 <= span.lo) {

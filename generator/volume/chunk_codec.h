@@ -21,7 +21,6 @@ inline constexpr std::uint8_t kChunkFormatVersion = 1;
 enum class FlowPlane : std::uint8_t { with, without };
 
 // Sanity limits of the decoder, checked before anything is allocated.
-inline constexpr std::int32_t kChunkHeightMax = 64;  ///< voxels; Grid::height's bound
 inline constexpr std::size_t kPaletteEntriesMax = 65536;
 inline constexpr std::size_t kLimitsMax = std::size_t{1} << 24U;
 /// No encoding of less than a byte for 32 limits is accepted (or made: the encoder pads), so that a

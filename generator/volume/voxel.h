@@ -21,7 +21,7 @@ namespace terrane {
 struct Voxel {
     std::array<Share, 2 * kCompositionMaterialsMax> storage{};
     std::uint8_t count = 0;
-    Flow flow;
+    Flow flow{};
 
     std::span<const Share> shares() const { return {storage.data(), count}; }
 

@@ -1,0 +1,316 @@
+#include "generator/volume/chunk_codec.h"
+
+#include "generator/volume/column_codec.h"
+#include "protocol/base/check.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace terrane {
+namespace {
+
+enum class RecordKind : std::uint8_t { uniform_chunk = 0, chunk = 1, stack = 2 };
+
+constexpr std::uint8_t kFlagFlow = 1;
+constexpr std::int32_t kApron = 1;
+
+// Single bytes below 128 are written as varints, which are the same bytes.
+void put_head(ByteWriter& out, RecordKind kind, bool with_flow) {
+    out.varint(kChunkFormatVersion);
+    out.varint(static_cast<std::uint64_t>(kind));
+    out.varint(with_flow ? kFlagFlow : 0U);
+}
+
+void put_entry(ByteWriter& out, const PaletteEntry& entry) {
+    out.varint(static_cast<unsigned>(entry.kind) | (entry.alone ? 4U : 0U) |
+               static_cast<unsigned>(entry.composition.count) << 3U);
+    for (const Share& share : entry.composition.shares()) {
+        out.varint(share.material);
+        out.f64(share.concentration);
+    }
+}
+
+void put_palette(ByteWriter& out, const Palette& palette) {
+    TERRANE_ASSERT(!palette.empty() && palette.size() <= kPaletteEntriesMax);
+    out.varint(palette.size());
+    for (const PaletteEntry& entry : palette) {
+        put_entry(out, entry);
+    }
+}
+
+/// How many bytes a record of so many limits has at least.
+std::size_t least_bytes(std::size_t limits) {
+    return (limits + kLimitsPerByteMax - 1) / kLimitsPerByteMax;
+}
+
+void put_columns(Bytes& out, const ColumnGrid& columns, const Palette& palette,
+                 const ColumnsLayout& layout) {
+    TERRANE_ASSERT(columns.width == layout.width && columns.length == layout.length);
+    TERRANE_ASSERT(columns.limits.size() <= kLimitsMax);
+    encode_columns(out, columns, palette, layout);
+    out.resize(std::max(out.size(), least_bytes(columns.limits.size())));
+}
+
+ColumnsLayout chunk_layout(std::int32_t side, bool with_flow) {
+    return {.width = side, .length = side, .apron = 0, .with_flow = with_flow};
+}
+
+ColumnsLayout stack_layout(std::int32_t side) {
+    const std::int32_t width = side + 2 * kApron;
+    return {.width = width, .length = width, .apron = kApron, .with_flow = true};
+}
+
+/// Reads heads; the first fault is kept, and everything after it reads as 0.
+class RecordReader {
+  public:
+    explicit RecordReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
+
+    bool ok() const { return !error_; }
+
+    tl::unexpected<Error> failure() const { return tl::unexpected<Error>(*error_); }
+
+    void refuse(ErrorCode code, const char* message) {
+        if (!error_) {
+            error_ = Error{.code = code, .message = message};
+        }
+    }
+
+    std::uint8_t byte() {
+        const auto value = reader_.fixed<std::uint8_t>();
+        if (!value) {
+            refuse(ErrorCode::malformed, "record: cut short");
+        }
+        return value.value_or(0);
+    }
+
+    /// A varint that is at most `most`.
+    std::uint64_t count(std::uint64_t most, const char* too_large) {
+        const auto value = reader_.varint();
+        if (!value) {
+            refuse(ErrorCode::malformed, "record: cut short");
+        } else if (*value > most) {
+            refuse(ErrorCode::too_large, too_large);
+        }
+        return ok() ? *value : 0;
+    }
+
+    std::int32_t int32() {
+        const auto value = reader_.varint();
+        if (!value || *value > std::numeric_limits<std::uint32_t>::max()) {
+            refuse(ErrorCode::malformed, "record: a number is cut short or beyond 32 bits");
+        }
+        return ok() ? static_cast<std::int32_t>(unzigzag(*value)) : 0;
+    }
+
+    double f64() {
+        const auto value = reader_.f64();
+        if (!value) {
+            refuse(ErrorCode::malformed, "record: cut short");
+        }
+        return value.value_or(0);
+    }
+
+    PaletteEntry entry() {
+        PaletteEntry made;
+        const unsigned head = byte();
+        const unsigned shares = head >> 3U;
+        if (shares > kCompositionMaterialsMax) {
+            refuse(ErrorCode::malformed, "palette: more materials than a composition has");
+            return made;
+        }
+        made.kind = static_cast<PaletteKind>(head & 3U);
+        made.alone = (head & 4U) != 0;
+        for (unsigned i = 0; i < shares && ok(); ++i) {
+            const std::uint64_t material =
+                count(kMaterialsMax - 1, "palette: a material's index is above 255");
+            const double concentration = f64();
+            if (!(concentration > 0 && concentration <= 1)) {  // a NaN is neither
+                refuse(ErrorCode::malformed, "palette: a concentration is not within 0..1");
+            }
+            made.composition.add(static_cast<std::uint16_t>(material), concentration);
+        }
+        return made;
+    }
+
+    Palette palette() {
+        Palette made;
+        const std::uint64_t entries = count(kPaletteEntriesMax, "palette: more than 65536 entries");
+        if (entries == 0) {
+            refuse(ErrorCode::malformed, "palette: empty");
+        }
+        for (std::uint64_t i = 0; i < entries && ok(); ++i) {
+            made.push_back(entry());
+        }
+        return made;
+    }
+
+    std::vector<std::uint16_t> stack_palette_ids(std::size_t entries) {
+        std::vector<std::uint16_t> ids;
+        std::uint64_t next = 0;
+        for (std::size_t i = 0; i < entries && ok(); ++i) {
+            next += count(kPaletteEntriesMax, "palette: a stack id is above 65535");
+            if (next >= kPaletteEntriesMax) {
+                refuse(ErrorCode::too_large, "palette: a stack id is above 65535");
+            }
+            ids.push_back(static_cast<std::uint16_t>(next));
+            ++next;
+        }
+        return ids;
+    }
+
+    void columns(ColumnGrid& out, const Palette& palette, const ColumnsLayout& layout) {
+        if (!ok()) {
+            return;
+        }
+        const std::size_t limits_max = std::min(kLimitsMax, bytes_.size() * kLimitsPerByteMax);
+        const auto decoded = decode_columns(out, reader_, palette, layout, limits_max);
+        if (!decoded) {
+            error_ = decoded.error();
+            return;
+        }
+        out.width = layout.width;
+        out.length = layout.length;
+        out.x_first = out.z_first = -layout.apron;
+        const std::size_t written = bytes_.size() - reader_.remaining();
+        const std::size_t least = std::max(written, least_bytes(out.limits.size()));
+        const auto padding = reader_.take(reader_.remaining());
+        if (bytes_.size() != least ||
+            std::ranges::any_of(*padding, [](std::byte byte) { return byte != std::byte{0}; })) {
+            refuse(ErrorCode::malformed, "record: bytes left over");
+        }
+    }
+
+    void end() {
+        if (reader_.remaining() != 0) {
+            refuse(ErrorCode::malformed, "record: bytes left over");
+        }
+    }
+
+  private:
+    std::span<const std::byte> bytes_;
+    ByteReader reader_;
+    std::optional<Error> error_;
+};
+
+struct Head {
+    RecordKind kind = RecordKind::chunk;
+    bool with_flow = false;
+};
+
+Head read_head(RecordReader& in) {
+    if (in.byte() != kChunkFormatVersion) {
+        in.refuse(ErrorCode::version_mismatch, "record: not of chunk format version 1");
+    }
+    const std::uint8_t kind = in.byte();
+    const std::uint8_t flags = in.byte();
+    if (kind > static_cast<std::uint8_t>(RecordKind::stack) || flags > kFlagFlow) {
+        in.refuse(ErrorCode::malformed, "record: unknown kind or flag");
+    }
+    return {.kind = static_cast<RecordKind>(kind), .with_flow = flags == kFlagFlow};
+}
+
+std::int32_t read_lod(RecordReader& in) {
+    return static_cast<std::int32_t>(
+        in.count(static_cast<std::uint64_t>(kLodMax), "record: level of detail above 17"));
+}
+
+std::int32_t read_side(RecordReader& in, std::int32_t most) {
+    const std::uint64_t side = in.count(static_cast<std::uint64_t>(most), "record: side above 64");
+    if (side == 0) {
+        in.refuse(ErrorCode::malformed, "record: a side is 0");
+    }
+    return static_cast<std::int32_t>(side);
+}
+
+}  // namespace
+
+void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
+    const bool with_flow = flow == FlowPlane::with && !chunk.uniform;
+    out.clear();
+    ByteWriter writer(out);
+    put_head(writer, chunk.uniform ? RecordKind::uniform_chunk : RecordKind::chunk, with_flow);
+    writer.varint(static_cast<std::uint64_t>(chunk.position.lod));
+    writer.varint(zigzag(chunk.position.x));
+    writer.varint(zigzag(chunk.position.y));
+    writer.varint(zigzag(chunk.position.z));
+    writer.varint(static_cast<std::uint64_t>(chunk.side));
+    writer.varint(static_cast<std::uint64_t>(chunk.height));
+    if (chunk.uniform) {
+        put_entry(writer, chunk.uniform_content);
+        return;
+    }
+    put_palette(writer, chunk.palette);
+    TERRANE_ASSERT(chunk.stack_palette_ids.size() == chunk.palette.size());
+    std::uint64_t next = 0;
+    for (const std::uint16_t id : chunk.stack_palette_ids) {
+        TERRANE_ASSERT(id >= next);
+        writer.varint(id - next);
+        next = std::uint64_t{id} + 1;
+    }
+    put_columns(out, chunk.columns, chunk.palette, chunk_layout(chunk.side, with_flow));
+}
+
+Result<Chunk> decode_chunk(std::span<const std::byte> bytes) {
+    RecordReader in(bytes);
+    const Head head = read_head(in);
+    if (head.kind == RecordKind::stack) {
+        in.refuse(ErrorCode::malformed, "record: a stack, not a chunk");
+    }
+    Chunk chunk;
+    chunk.position.lod = read_lod(in);
+    chunk.position.x = in.int32();
+    chunk.position.y = in.int32();
+    chunk.position.z = in.int32();
+    chunk.side = read_side(in, kChunkSideMax);
+    chunk.height = read_side(in, kChunkSideMax);
+    chunk.uniform = head.kind == RecordKind::uniform_chunk;
+    if (chunk.uniform) {
+        chunk.uniform_content = in.entry();
+        in.end();
+    } else {
+        chunk.palette = in.palette();
+        chunk.stack_palette_ids = in.stack_palette_ids(chunk.palette.size());
+        in.columns(chunk.columns, chunk.palette, chunk_layout(chunk.side, head.with_flow));
+    }
+    if (!in.ok()) {
+        return in.failure();
+    }
+    return chunk;
+}
+
+void encode_stack(Bytes& out, const Stack& stack) {
+    out.clear();
+    ByteWriter writer(out);
+    put_head(writer, RecordKind::stack, true);
+    writer.varint(static_cast<std::uint64_t>(stack.position.lod));
+    writer.varint(zigzag(stack.position.x));
+    writer.varint(zigzag(stack.position.z));
+    writer.varint(static_cast<std::uint64_t>(stack.side));
+    writer.varint(zigzag(stack.highest_y256));
+    put_palette(writer, stack.palette);
+    put_columns(out, stack.columns, stack.palette, stack_layout(stack.side));
+}
+
+Result<Stack> decode_stack(std::span<const std::byte> bytes) {
+    RecordReader in(bytes);
+    const Head head = read_head(in);
+    if (head.kind != RecordKind::stack || !head.with_flow) {
+        in.refuse(ErrorCode::malformed, "record: a chunk, not a stack");
+    }
+    Stack stack;
+    stack.position.lod = read_lod(in);
+    stack.position.x = in.int32();
+    stack.position.z = in.int32();
+    stack.side = read_side(in, kChunkSideMax);
+    stack.highest_y256 = in.int32();
+    stack.palette = in.palette();
+    in.columns(stack.columns, stack.palette, stack_layout(stack.side));
+    if (!in.ok()) {
+        return in.failure();
+    }
+    return stack;
+}
+
+}  // namespace terrane
