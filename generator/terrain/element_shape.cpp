@@ -1,6 +1,7 @@
 #include "generator/terrain/element_shape.h"
 
 #include "generator/terrain/random.h"
+#include "protocol/base/coords.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,22 +58,31 @@ Outline draw_outline(const Element& element) {
     return outline;
 }
 
+/// The first index 0..count whose coordinate, first + index * step, is not below `edge`.
+std::int32_t index_at_or_after(float edge, std::int64_t first, std::int64_t step,
+                               std::int32_t count) {
+    const std::int64_t distance = static_cast<std::int64_t>(std::ceil(edge)) - first;
+    return static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(floor_div(distance + step - 1, step), 0, count));
+}
+
 /// Rows of a rectangle that a segment crosses: az <= z < bz or the other way round.
 void add_crossings(const ElementShape& shape, std::size_t point, const LocalRectangle& rectangle,
                    RasterBuffers& buffers) {
     const std::size_t next = (point + 1) % kOutlinePoints;
     const float az = shape.z[point];
     const float bz = shape.z[next];
-    const auto first_row = static_cast<std::int64_t>(std::ceil(std::min(az, bz)));
-    const auto end_row = static_cast<std::int64_t>(std::ceil(std::max(az, bz)));
-    const std::int64_t begin = std::max(first_row, rectangle.z0);
-    const std::int64_t end = std::min(end_row, rectangle.z0 + rectangle.length);
+    const std::int32_t begin =
+        index_at_or_after(std::min(az, bz), rectangle.z0, rectangle.step, rectangle.length);
+    const std::int32_t end =
+        index_at_or_after(std::max(az, bz), rectangle.z0, rectangle.step, rectangle.length);
     if (begin >= end) {
         return;
     }
     const float slope = (shape.x[next] - shape.x[point]) / (bz - az);
-    for (std::int64_t z = begin; z < end; ++z) {
-        const auto row = static_cast<std::size_t>(z - rectangle.z0);
+    for (std::int32_t i = begin; i < end; ++i) {
+        const auto row = static_cast<std::size_t>(i);
+        const std::int64_t z = rectangle.z0 + i * rectangle.step;
         const auto at = static_cast<std::size_t>(buffers.crossing_counts[row]++);
         buffers.crossings[row * kOutlinePoints + at] =
             shape.x[point] + (static_cast<float>(z) - az) * slope;
@@ -84,12 +94,11 @@ void mark_inside(std::uint8_t* inside, float* crossings, std::size_t count,
                  const LocalRectangle& rectangle) {
     std::sort(crossings, crossings + count);
     const auto to_column = [&rectangle](float x) {
-        const std::int64_t column = static_cast<std::int64_t>(std::ceil(x)) - rectangle.x0;
-        return std::clamp<std::int64_t>(column, 0, rectangle.width);
+        return index_at_or_after(x, rectangle.x0, rectangle.step, rectangle.width);
     };
     for (std::size_t i = 0; i + 1 < count; i += 2) {
-        const std::int64_t begin = to_column(crossings[i]);
-        const std::int64_t end = to_column(crossings[i + 1]);
+        const std::int32_t begin = to_column(crossings[i]);
+        const std::int32_t end = to_column(crossings[i + 1]);
         if (begin < end) {
             std::fill(inside + begin, inside + end, std::uint8_t{1});
         }
@@ -172,8 +181,10 @@ void raster_element(float* out, std::int32_t stride, const Element& element,
             if (!any_inside(buffers.inside.data(), rectangle.width, tile)) {
                 continue;
             }
-            kernels.element_tile(values.data(), static_cast<float>(rectangle.x0 + tile.column),
-                                 static_cast<float>(rectangle.z0 + tile.row), shape.segments,
+            kernels.element_tile(values.data(),
+                                 static_cast<float>(rectangle.x0 + tile.column * rectangle.step),
+                                 static_cast<float>(rectangle.z0 + tile.row * rectangle.step),
+                                 static_cast<float>(rectangle.step), shape.segments,
                                  inverse_half_side, element.thickness);
             for (std::int32_t z = 0; z < tile.rows; ++z) {
                 for (std::int32_t x = 0; x < tile.columns; ++x) {

@@ -29,6 +29,7 @@ struct LocalRectangle {
     std::int64_t z0 = 0;
     std::int32_t width = 0;
     std::int32_t length = 0;
+    std::int64_t step = 1;  ///< voxels from column to column
 };
 
 /// Memory of `raster_element`; one thread's.

@@ -21,8 +21,9 @@ struct StackGenerator::Buffers {
 namespace {
 
 Result<void> check_range(const ColumnRectangle& rectangle) {
-    const auto inside = [](std::int64_t first, std::int32_t count) {
-        return first - 1 > -kColumnCoordinateLimit && first + count < kColumnCoordinateLimit;
+    const auto inside = [step = rectangle.step()](std::int64_t first, std::int32_t count) {
+        return first - step > -kColumnCoordinateLimit &&
+               first + count * step < kColumnCoordinateLimit;
     };
     if (!inside(rectangle.x0, rectangle.width) || !inside(rectangle.z0, rectangle.length)) {
         return fail(ErrorCode::out_of_range, "column (" + std::to_string(rectangle.x0) + ", " +
@@ -44,13 +45,14 @@ StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
 StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
 
 Result<void> StackGenerator::generate(Stack& out, StackPos position) {
-    if (position.lod != 0) {
-        return fail(ErrorCode::unsupported,
-                    "level of detail " + std::to_string(position.lod) + ": only 0 is served");
+    if (position.lod < 0 || position.lod > kLodMax) {
+        return fail(ErrorCode::unsupported, "level of detail " + std::to_string(position.lod) +
+                                                ": there are 0 to " + std::to_string(kLodMax));
     }
     const std::int32_t side = world_->definition.grid.side;
     const ColumnPos first = first_column_of(position, side);
-    const ColumnRectangle rectangle{.x0 = first.x, .z0 = first.z, .width = side, .length = side};
+    const ColumnRectangle rectangle{
+        .x0 = first.x, .z0 = first.z, .width = side, .length = side, .lod = position.lod};
     if (auto checked = check_range(rectangle); !checked) {
         return checked;
     }

@@ -84,17 +84,25 @@ float octave_at(const NoiseOctave& octave, std::int64_t x, std::int64_t z) {
 /// Hands out pieces of the buffers; they are sized before any piece is taken.
 class Pieces {
   public:
-    explicit Pieces(NoiseBuffers& buffers, const RectangleShape& shape, std::int32_t octaves) {
+    Pieces(NoiseBuffers& buffers, const RectangleShape& shape, std::int32_t octaves) {
         const auto row = static_cast<std::size_t>(shape.stride() + 2 * kVectorPad);
         const auto length = static_cast<std::size_t>(shape.length);
-        const auto lattice = (row + 2) * (length + 2);
-        buffers.floats.resize(
-            std::max(buffers.floats.size(),
-                     static_cast<std::size_t>(octaves) * (2 * row + length + 2 * lattice)));
-        buffers.integers.resize(std::max(
-            buffers.integers.size(), static_cast<std::size_t>(octaves) * (2 * row + 2 + length)));
+        const auto lattice = lattice_row(shape) * 2 * length;
+        const auto count = static_cast<std::size_t>(octaves);
+        const auto grow = [](auto& buffer, std::size_t size) {
+            buffer.resize(std::max(buffer.size(), size));
+        };
+        grow(buffers.floats, count * (2 * row + length + 2 * lattice));
+        grow(buffers.integers, count * (2 * row + 2 + length));
+        grow(buffers.hashes, lattice_row(shape));
         floats_ = buffers.floats.data();
         integers_ = buffers.integers.data();
+        hashes_ = buffers.hashes.data();
+    }
+
+    /// At most two lattice columns a column, in whole blocks.
+    static std::size_t lattice_row(const RectangleShape& shape) {
+        return static_cast<std::size_t>(padded_width(2 * shape.width));
     }
 
     float* floats(std::size_t count) { return std::exchange(floats_, floats_ + count); }
@@ -103,68 +111,123 @@ class Pieces {
         return std::exchange(integers_, integers_ + count);
     }
 
+    /// One row of lattice columns; the same memory for every octave.
+    std::uint64_t* hashes() { return hashes_; }
+
   private:
     float* floats_;
     std::int32_t* integers_;
+    std::uint64_t* hashes_;
 };
 
-NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const RectangleShape& shape) {
+/// Walks positions along one axis and numbers the lattice lines next to them. Far apart positions
+/// leave out the lines between; near ones share theirs.
+class LatticeLines {
+  public:
+    LatticeLines(std::int64_t first, std::int64_t step, std::uint64_t frequency,
+                 std::uint64_t offset)
+        : coordinate_(first), step_(step), frequency_(frequency), offset_(offset) {}
+
+    struct Next {
+        float fraction = 0;
+        std::int32_t entry = 0;      ///< of the line below the position
+        std::int32_t new_lines = 0;  ///< the last so many lines were not there before
+        std::int64_t cell = 0;
+    };
+
+    Next next() {
+        const LatticePosition position = lattice_position(coordinate_, frequency_, offset_);
+        coordinate_ += step_;
+        Next next{.fraction = position.fraction, .cell = position.cell};
+        if (count_ > 0 && position.cell == last_cell_) {
+            next.new_lines = 0;
+        } else if (count_ > 0 && position.cell == last_cell_ + 1) {
+            next.new_lines = 1;
+        } else {
+            next.new_lines = 2;
+        }
+        count_ += next.new_lines;
+        last_cell_ = position.cell;
+        next.entry = count_ - 2;
+        return next;
+    }
+
+    std::int32_t count() const { return count_; }
+
+  private:
+    std::int64_t coordinate_;
+    std::int64_t step_;
+    std::uint64_t frequency_;
+    std::uint64_t offset_;
+    std::int64_t last_cell_ = 0;
+    std::int32_t count_ = 0;
+};
+
+/// Fills the columns' part of `rows` and the hashes of the lattice columns.
+void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave,
+                     const RectangleShape& shape) {
     const auto row = static_cast<std::size_t>(shape.stride() + 2 * kVectorPad);
     float* const fraction_x = pieces.floats(row);
     float* const fade_x = pieces.floats(row);
     std::int32_t* const column_cell = pieces.integers(row);
     std::int32_t* const cell_begin = pieces.integers(row + 2);
-    NoiseRows rows;
-    const std::int64_t first_cell =
-        lattice_position(shape.x0, octave.frequency, octave.offset_x).cell;
+    LatticeLines lines(shape.x0, shape.step, octave.frequency, octave.offset_x);
     for (std::int32_t i = 0; i < shape.width; ++i) {
-        const LatticePosition position =
-            lattice_position(shape.x0 + i, octave.frequency, octave.offset_x);
-        fraction_x[i] = position.fraction;
-        fade_x[i] = fade(position.fraction);
-        column_cell[i] = static_cast<std::int32_t>(position.cell - first_cell);
-        while (rows.cell_count <= column_cell[i]) {
-            cell_begin[rows.cell_count++] = i;
+        const LatticeLines::Next next = lines.next();
+        fraction_x[i] = next.fraction;
+        fade_x[i] = fade(next.fraction);
+        column_cell[i] = next.entry;
+        if (next.new_lines > 0) {
+            // Wide cells follow each other, so that entries count cells.
+            cell_begin[std::min(next.entry, i)] = i;
+            std::uint64_t* const hashes = pieces.hashes() + next.entry;
+            for (std::int32_t line = 2 - next.new_lines; line < 2; ++line) {
+                hashes[line] = combine(octave.seed, static_cast<std::uint64_t>(next.cell + line));
+            }
         }
     }
-    cell_begin[rows.cell_count] = shape.width;
+    rows.lattice_columns = lines.count();
+    rows.wide_cells = octave.period >= kWideCellPeriod * static_cast<float>(shape.step);
+    if (rows.wide_cells) {
+        cell_begin[rows.lattice_columns - 1] = shape.width;
+    }
     std::fill(fraction_x + shape.width, fraction_x + row, 0.0F);
     std::fill(fade_x + shape.width, fade_x + row, 0.0F);
     std::fill(column_cell + shape.width, column_cell + row, 0);
-    float* const fraction_z = pieces.floats(static_cast<std::size_t>(shape.length));
-    std::int32_t* const row_cell = pieces.integers(static_cast<std::size_t>(shape.length));
-    const std::int64_t first_row =
-        lattice_position(shape.z0, octave.frequency, octave.offset_z).cell;
-    for (std::int32_t i = 0; i < shape.length; ++i) {
-        const LatticePosition position =
-            lattice_position(shape.z0 + i, octave.frequency, octave.offset_z);
-        fraction_z[i] = position.fraction;
-        row_cell[i] = static_cast<std::int32_t>(position.cell - first_row);
-    }
-    const std::int32_t lattice_rows = row_cell[shape.length - 1] + 2;
-    const std::int32_t lattice_columns = rows.cell_count + 1;
-    float* const gradient_x =
-        pieces.floats(static_cast<std::size_t>(lattice_rows * lattice_columns));
-    float* const gradient_z =
-        pieces.floats(static_cast<std::size_t>(lattice_rows * lattice_columns));
-    for (std::int32_t c = 0; c < lattice_columns; ++c) {
-        const std::uint64_t hash = combine(octave.seed, static_cast<std::uint64_t>(first_cell + c));
-        for (std::int32_t r = 0; r < lattice_rows; ++r) {
-            const Gradient gradient = gradient_at(hash, first_row + r);
-            gradient_x[r * lattice_columns + c] = gradient.x;
-            gradient_z[r * lattice_columns + c] = gradient.z;
-        }
-    }
     rows.fraction_x = fraction_x;
     rows.fade_x = fade_x;
     rows.column_cell = column_cell;
     rows.cell_begin = cell_begin;
+}
+
+NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const RectangleShape& shape,
+                         const RowKernels& kernels) {
+    NoiseRows rows;
+    rows.amplitude = octave.amplitude;
+    prepare_columns(rows, pieces, octave, shape);
+    const auto length = static_cast<std::size_t>(shape.length);
+    float* const fraction_z = pieces.floats(length);
+    std::int32_t* const row_cell = pieces.integers(length);
+    const std::size_t lattice = Pieces::lattice_row(shape) * 2 * length;
+    float* const gradient_x = pieces.floats(lattice);
+    float* const gradient_z = pieces.floats(lattice);
+    LatticeLines lines(shape.z0, shape.step, octave.frequency, octave.offset_z);
+    for (std::size_t i = 0; i < length; ++i) {
+        const LatticeLines::Next next = lines.next();
+        fraction_z[i] = next.fraction;
+        row_cell[i] = next.entry;
+        for (std::int32_t line = 2 - next.new_lines; line < 2; ++line) {
+            // Rows are packed; a row's last block runs into the next row, which follows.
+            const std::int32_t at = (next.entry + line) * rows.lattice_columns;
+            kernels.gradients(gradient_x + at, gradient_z + at, pieces.hashes(),
+                              combine_value(static_cast<std::uint64_t>(next.cell + line)),
+                              rows.lattice_columns);
+        }
+    }
     rows.fraction_z = fraction_z;
     rows.row_cell = row_cell;
     rows.gradient_x = gradient_x;
     rows.gradient_z = gradient_z;
-    rows.amplitude = octave.amplitude;
-    rows.wide_cells = octave.period >= kWideCellPeriod;
     return rows;
 }
 
@@ -209,7 +272,7 @@ void noise_rectangle(float* out, const Noise& noise, const RectangleShape& shape
     Pieces pieces(buffers, shape, noise.octave_count);
     std::array<NoiseRows, kNoiseOctavesMax> rows;
     for (std::size_t o = 0; o < static_cast<std::size_t>(noise.octave_count); ++o) {
-        rows[o] = prepare_octave(pieces, noise.octaves[o], shape);
+        rows[o] = prepare_octave(pieces, noise.octaves[o], shape, kernels);
     }
     kernels.noise(out, shape.stride(), shape.width, shape.length, rows.data(), noise.octave_count);
 }

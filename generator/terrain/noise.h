@@ -46,6 +46,7 @@ struct RectangleShape {
     std::int64_t z0 = 0;
     std::int32_t width = 0;   ///< columns along x, 1..kRectangleSideMax
     std::int32_t length = 0;  ///< columns along z, likewise
+    std::int64_t step = 1;    ///< voxels from column to column: 2^lod
 
     std::int32_t stride() const { return padded_width(width); }
 
@@ -58,6 +59,7 @@ struct RectangleShape {
 struct NoiseBuffers {
     std::vector<float> floats;
     std::vector<std::int32_t> integers;
+    std::vector<std::uint64_t> hashes;
 };
 
 /// Fills `out` (padded_size() floats) with the noise, bit for bit noise_at's.

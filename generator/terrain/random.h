@@ -22,8 +22,13 @@ constexpr std::uint64_t mix(std::uint64_t z) {
     return z ^ (z >> 31U);
 }
 
+/// What `combine` folds in for a value.
+constexpr std::uint64_t combine_value(std::uint64_t value) {
+    return value * 0x9E3779B97F4A7C15U + 0xD1B54A32D192ED03U;
+}
+
 constexpr std::uint64_t combine(std::uint64_t hash, std::uint64_t value) {
-    return mix(hash ^ (value * 0x9E3779B97F4A7C15U + 0xD1B54A32D192ED03U));
+    return mix(hash ^ combine_value(value));
 }
 
 constexpr std::uint64_t as_key_part(Tag tag) {

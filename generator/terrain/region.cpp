@@ -24,22 +24,20 @@ std::optional<PlacedElement> place(const PlottedElement& plotted, const Rectangl
     const Element& element = plotted.element;
     const std::int64_t x = element.plot.x * plot_side - shape.x0;
     const std::int64_t z = element.plot.z * plot_side - shape.z0;
-    const float half = element.side * 0.5F + 1.0F;  // a column of slack for float rounding
-    const auto clamped = [](std::int64_t value, std::int32_t most) {
-        return static_cast<std::int32_t>(std::clamp<std::int64_t>(value, 0, most));
+    const float half = element.side * 0.5F + 1.0F;  // a voxel of slack for float rounding
+    const auto index_after = [&shape](std::int64_t voxels, std::int32_t most) {
+        const std::int64_t index = floor_div(voxels + shape.step - 1, shape.step);
+        return static_cast<std::int32_t>(std::clamp<std::int64_t>(index, 0, most));
     };
+    const auto voxels = [](float value) { return static_cast<std::int64_t>(std::floor(value)); };
     PlacedElement placed;
     placed.plotted = &plotted;
-    placed.column_first =
-        clamped(x + static_cast<std::int64_t>(std::floor(element.center_x - half)), shape.width);
-    placed.row_first =
-        clamped(z + static_cast<std::int64_t>(std::floor(element.center_z - half)), shape.length);
-    placed.columns = clamped(x + static_cast<std::int64_t>(std::ceil(element.center_x + half)) + 1,
-                             shape.width) -
-                     placed.column_first;
-    placed.rows = clamped(z + static_cast<std::int64_t>(std::ceil(element.center_z + half)) + 1,
-                          shape.length) -
-                  placed.row_first;
+    placed.column_first = index_after(x + voxels(element.center_x - half), shape.width);
+    placed.row_first = index_after(z + voxels(element.center_z - half), shape.length);
+    placed.columns =
+        index_after(x + voxels(element.center_x + half) + 1, shape.width) - placed.column_first;
+    placed.rows =
+        index_after(z + voxels(element.center_z + half) + 1, shape.length) - placed.row_first;
     if (placed.columns <= 0 || placed.rows <= 0) {
         return std::nullopt;
     }
@@ -52,18 +50,21 @@ void find_elements(Region& region, const World& world, PlotCache& plots,
                    const RowKernels& kernels) {
     region.elements.clear();
     region.gap_begin.assign(world.stack.layers.size(), 0);
-    if (world.stack.gap_count() == 0) {
+    const TerrainParameters& terrain = world.definition.terrain;
+    const double area = std::max(terrain.vein_area, terrain.cave_area);
+    // A coarse level would sample an element too thinly, and meet thousands of plots.
+    const bool too_coarse =
+        region.shape.step > 1 && static_cast<double>(region.shape.step) > area / 8;
+    if (world.stack.gap_count() == 0 || too_coarse) {
         return;
     }
-    const TerrainParameters& terrain = world.definition.terrain;
     const std::int32_t side = world.definition.grid.plot;
-    const auto reach =
-        static_cast<std::int64_t>(std::max(terrain.vein_area, terrain.cave_area) / 2) + 2;
+    const auto reach = static_cast<std::int64_t>(area / 2) + 2;
     const RectangleShape& shape = region.shape;
     const PlotPos first{.x = floor_div(shape.x0 - reach, side),
                         .z = floor_div(shape.z0 - reach, side)};
-    const PlotPos last{.x = floor_div(shape.x0 + shape.width - 1 + reach, side),
-                       .z = floor_div(shape.z0 + shape.length - 1 + reach, side)};
+    const PlotPos last{.x = floor_div(shape.x0 + (shape.width - 1) * shape.step + reach, side),
+                       .z = floor_div(shape.z0 + (shape.length - 1) * shape.step + reach, side)};
     for (std::int64_t pz = first.z; pz <= last.z; ++pz) {
         for (std::int64_t px = first.x; px <= last.x; ++px) {
             for (PlottedElement& plotted : plots.get(world, {.x = px, .z = pz})) {
@@ -92,10 +93,11 @@ void find_elements(Region& region, const World& world, PlotCache& plots,
         const Element& element = placed.element();
         raster_element(region.thickness.data() + placed.raster, placed.stride, element,
                        *placed.plotted->shape,
-                       {.x0 = shape.x0 + placed.column_first - element.plot.x * side,
-                        .z0 = shape.z0 + placed.row_first - element.plot.z * side,
+                       {.x0 = shape.x0 + placed.column_first * shape.step - element.plot.x * side,
+                        .z0 = shape.z0 + placed.row_first * shape.step - element.plot.z * side,
                         .width = placed.columns,
-                        .length = placed.rows},
+                        .length = placed.rows,
+                        .step = shape.step},
                        kernels, region.raster_buffers);
     }
     std::size_t next = 0;
@@ -133,7 +135,9 @@ void build_flow(Region& region, const TerrainConstants& constants, std::size_t l
     const RectangleShape inner{.x0 = region.inner.x0,
                                .z0 = region.inner.z0,
                                .width = region.inner.width,
-                               .length = region.inner.length};
+                               .length = region.inner.length,
+                               .step = region.shape.step};
+    const float half_per_step = 0.5F / static_cast<float>(inner.step);
     noise_rectangle(region.noise.data(), constants.flow_noise[layer], inner, kernels,
                     region.noise_buffers);
     const std::int32_t stride = region.shape.stride();
@@ -143,7 +147,7 @@ void build_flow(Region& region, const TerrainConstants& constants, std::size_t l
         kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
                      region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
                      heights + static_cast<std::ptrdiff_t>(row + 1) * stride + 1, stride,
-                     region.flow_stride);
+                     region.flow_stride, half_per_step);
     }
 }
 
@@ -188,10 +192,11 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
                    rectangle.length >= 1 && rectangle.length <= kRectangleSideMax - 2);
     const std::size_t layers = world.stack.layers.size();
     region.inner = rectangle;
-    region.shape = {.x0 = rectangle.x0 - 1,
-                    .z0 = rectangle.z0 - 1,
+    region.shape = {.x0 = rectangle.x0 - rectangle.step(),
+                    .z0 = rectangle.z0 - rectangle.step(),
                     .width = rectangle.width + 2,
-                    .length = rectangle.length + 2};
+                    .length = rectangle.length + 2,
+                    .step = rectangle.step()};
     region.flow_stride = padded_width(rectangle.width);
     allocate(region, layers);
     plots.trim();

@@ -15,12 +15,15 @@
 
 namespace terrane {
 
-/// Columns x0 <= x < x0 + width, z0 <= z < z0 + length. Sides 1..kRectangleSideMax - 2.
+/// `width` x `length` columns from (x0, z0) on, 2^lod voxels apart. Sides 1..kRectangleSideMax - 2.
 struct ColumnRectangle {
     std::int64_t x0 = 0;
     std::int64_t z0 = 0;
     std::int32_t width = 0;
     std::int32_t length = 0;
+    std::int32_t lod = 0;
+
+    std::int64_t step() const { return std::int64_t{1} << lod; }
 };
 
 /// An element that stands in the region, with its raster over the columns it may cover.

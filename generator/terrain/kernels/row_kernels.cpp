@@ -15,14 +15,44 @@ float fade(float t) {
     return t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F);
 }
 
+/// Unit vectors at (i + 1/2) * 22.5 degrees from +x.
+alignas(64) constexpr float kGradientX[16] = {.98078528F,  .83146961F,  .55557023F,  .19509032F,
+                                              -.19509032F, -.55557023F, -.83146961F, -.98078528F,
+                                              -.98078528F, -.83146961F, -.55557023F, -.19509032F,
+                                              .19509032F,  .55557023F,  .83146961F,  .98078528F};
+alignas(64) constexpr float kGradientZ[16] = {.19509032F,  .55557023F,  .83146961F,  .98078528F,
+                                              .98078528F,  .83146961F,  .55557023F,  .19509032F,
+                                              -.19509032F, -.55557023F, -.83146961F, -.98078528F,
+                                              -.98078528F, -.83146961F, -.55557023F, -.19509032F};
+
+void gradients(float* __restrict x, float* __restrict z,
+               const std::uint64_t* __restrict column_hash, std::uint64_t row_value,
+               std::int32_t count) {
+    for (std::int32_t first = 0; first < count; first += kBlock) {
+        std::int32_t number[kBlock];
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            std::uint64_t hash = column_hash[first + i] ^ row_value;  // mix of random.h
+            hash ^= hash >> 30U;
+            hash *= 0xbf58476d1ce4e5b9U;
+            hash ^= hash >> 27U;
+            hash *= 0x94d049bb133111ebU;
+            number[i] = static_cast<std::int32_t>((hash ^ (hash >> 31U)) >> 60U);
+        }
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            x[first + i] = kGradientX[number[i]];
+            z[first + i] = kGradientZ[number[i]];
+        }
+    }
+}
+
 /// One row of one octave: per lattice column the two lines A + B * f.
 struct LatticeRow {
-    float a[kRectangleSideMax + 2 * kBlock + 2];
-    float b[kRectangleSideMax + 2 * kBlock + 2];
+    float a[2 * kRectangleSideMax + 2];
+    float b[2 * kRectangleSideMax + 2];
 };
 
 void fold_gradients(LatticeRow& lattice, const NoiseRows& octave, std::int32_t row) {
-    const std::int32_t cells = octave.cell_count + 1;
+    const std::int32_t cells = octave.lattice_columns;
     const float* near_x = octave.gradient_x + octave.row_cell[row] * cells;
     const float* near_z = octave.gradient_z + octave.row_cell[row] * cells;
     const float* far_x = near_x + cells;
@@ -41,7 +71,7 @@ void fold_gradients(LatticeRow& lattice, const NoiseRows& octave, std::int32_t r
 /// written.
 void noise_row_by_cells(float* __restrict out, const float* __restrict sum, const NoiseRows& octave,
                         const LatticeRow& lattice) {
-    for (std::int32_t cell = 0; cell < octave.cell_count; ++cell) {
+    for (std::int32_t cell = 0; cell + 1 < octave.lattice_columns; ++cell) {
         const float a0 = lattice.a[cell];
         const float b0 = lattice.b[cell];
         const float a1 = lattice.a[cell + 1];
@@ -129,7 +159,8 @@ std::int32_t round_half_away(float value) {
 }
 
 void flow(std::int32_t* __restrict packed, const float* __restrict noise_of,
-          const float* __restrict height, std::int32_t stride, std::int32_t count) {
+          const float* __restrict height, std::int32_t stride, std::int32_t count,
+          float half_per_step) {
     const float* const before = height - stride;
     const float* const after = height + stride;
     for (std::int32_t first = 0; first < count; first += kBlock) {
@@ -141,8 +172,8 @@ void flow(std::int32_t* __restrict packed, const float* __restrict noise_of,
             quarter = quarter > 0.5F ? quarter - 1.0F : quarter;
             const float sine = sine_of_turns(turns);
             const float cosine = sine_of_turns(quarter);
-            const float slope_x = 0.5F * (height[i + 1] - height[i - 1]);
-            const float slope_z = 0.5F * (after[i] - before[i]);
+            const float slope_x = half_per_step * (height[i + 1] - height[i - 1]);
+            const float slope_z = half_per_step * (after[i] - before[i]);
             const float rise = cosine * slope_x + sine * slope_z;
             const float scale =
                 127.0F / __builtin_sqrtf(cosine * cosine + sine * sine + rise * rise);
@@ -243,23 +274,24 @@ float nearest_of_groups(float* __restrict nearest, float x, float z, const Segme
     return least;
 }
 
-void element_tile(float* __restrict thickness, float x, float z, const SegmentTable& segments,
-                  float inverse_half_side, float thick) {
+void element_tile(float* __restrict thickness, float x, float z, float step,
+                  const SegmentTable& segments, float inverse_half_side, float thick) {
     // The nearest segment of any column of the tile is at most the tile's diagonal farther from the
     // tile's middle than the middle's own nearest one; the slack is far above rounding errors.
     constexpr float kHalf = 0.5F * (kTileSide - 1);
     constexpr float kDiagonal = 4.2427F;
     float group_nearest[kSegmentGroups];
-    const float middle = nearest_of_groups(group_nearest, x + kHalf, z + kHalf, segments);
-    const float reach = (__builtin_sqrtf(middle) + kDiagonal) * 1.001F + 0.01F;
+    const float middle =
+        nearest_of_groups(group_nearest, x + kHalf * step, z + kHalf * step, segments);
+    const float reach = (__builtin_sqrtf(middle) + kDiagonal * step) * 1.001F + 0.01F;
     const float reach_square = reach * reach;
     constexpr std::int32_t kTile = kTileSide * kTileSide;
     float column_x[kTile];
     float column_z[kTile];
     float nearest[kTile];
     for (std::int32_t i = 0; i < kTile; ++i) {
-        column_x[i] = x + static_cast<float>(i % kTileSide);
-        column_z[i] = z + static_cast<float>(i / kTileSide);
+        column_x[i] = x + static_cast<float>(i % kTileSide) * step;
+        column_z[i] = z + static_cast<float>(i / kTileSide) * step;
         nearest[i] = 3.0e38F;
     }
     for (std::int32_t g = 0; g < kSegmentGroups; ++g) {
@@ -290,7 +322,8 @@ void element_tile(float* __restrict thickness, float x, float z, const SegmentTa
 }  // namespace
 
 extern const RowKernels kKernels;
-const RowKernels kKernels = {.noise = noise,
+const RowKernels kKernels = {.gradients = gradients,
+                             .noise = noise,
                              .heights = heights,
                              .flow = flow,
                              .quantise = quantise,

@@ -22,16 +22,18 @@ constexpr std::int32_t padded_width(std::int32_t width) {
 }
 
 /// One octave of noise over a rectangle, prepared: positions split into lattice cell and fraction.
+/// Only lattice columns and rows next to a position are there; a position's cell lies between entry
+/// `*_cell` and the one after it.
 struct NoiseRows {
     const float* fraction_x = nullptr;          ///< per column, padded
     const float* fade_x = nullptr;              ///< per column, padded
-    const std::int32_t* column_cell = nullptr;  ///< per column, padded: lattice cell, from 0
-    const std::int32_t* cell_begin = nullptr;   ///< cell_count + 1: first column of each cell
+    const std::int32_t* column_cell = nullptr;  ///< per column, padded
+    const std::int32_t* cell_begin = nullptr;   ///< wide cells: first column of each; then the end
     const float* fraction_z = nullptr;          ///< per row
-    const std::int32_t* row_cell = nullptr;     ///< per row: lattice row, from 0
-    const float* gradient_x = nullptr;          ///< (rows + 1) x (cell_count + 1)
+    const std::int32_t* row_cell = nullptr;     ///< per row
+    const float* gradient_x = nullptr;          ///< lattice rows x lattice_columns
     const float* gradient_z = nullptr;
-    std::int32_t cell_count = 0;
+    std::int32_t lattice_columns = 0;
     float amplitude = 0;
     bool wide_cells = false;  ///< cells are wide enough to go cell by cell
 };
@@ -72,6 +74,10 @@ struct PlainRow {
 };
 
 struct RowKernels {
+    /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
+    /// the top four bits of mix(hash ^ row_value) number the sixteen unit vectors. Whole blocks.
+    void (*gradients)(float* x, float* z, const std::uint64_t* column_hash, std::uint64_t row_value,
+                      std::int32_t count);
     /// out[row * stride + column], padded rows: sum of the octaves, in order, from 0.
     void (*noise)(float* out, std::int32_t stride, std::int32_t width, std::int32_t length,
                   const NoiseRows* octaves, std::int32_t octave_count);
@@ -80,9 +86,10 @@ struct RowKernels {
     void (*heights)(float* height, float* stacked, const float* noise, std::int32_t count,
                     HeightConstants constants);
     /// packed[i] = x | y << 8 | z << 16 of a row's flow; `height` points at the row's first column
-    /// and its neighbours lie at -1, +1, -stride and +stride. `count` is a multiple of kVectorPad.
+    /// and its neighbours lie at -1, +1, -stride and +stride, `half_per_step` = 1 / (2 * their
+    /// distance in voxels). `count` is a multiple of kVectorPad.
     void (*flow)(std::int32_t* packed, const float* noise, const float* height, std::int32_t stride,
-                 std::int32_t count);
+                 std::int32_t count, float half_per_step);
     /// y256[i] = the height in 1/256 voxel.
     void (*quantise)(std::int32_t* y256, const float* height, std::int32_t count);
     /// middle[i] = where the blend of the layer between `bottom` and `top` ends, in 1/256 voxel;
@@ -93,10 +100,10 @@ struct RowKernels {
     /// in memory as 12 bytes: y256, palette id | flow << 16.
     void (*plain_columns)(void* limits, const PlainRow& row, std::int32_t first,
                           std::int32_t count);
-    /// thickness of an element in a tile whose first column is (x, z): kTileSide rows of kTileSide.
-    /// As if the whole plane were inside the outline.
-    void (*element_tile)(float* thickness, float x, float z, const SegmentTable& segments,
-                         float inverse_half_side, float thick);
+    /// thickness of an element in a tile whose first column is (x, z): kTileSide rows of kTileSide,
+    /// `step` voxels apart. As if the whole plane were inside the outline.
+    void (*element_tile)(float* thickness, float x, float z, float step,
+                         const SegmentTable& segments, float inverse_half_side, float thick);
 };
 
 namespace kernels_scalar {
