@@ -221,6 +221,9 @@ int run_get(const GetOptions& options) {
 
 namespace {
 
+constexpr double kTimeoutMinS = 0.001;
+constexpr double kTimeoutMaxS = 86400;
+
 /// As CLI11 gives them, before they are understood.
 struct GetFlags {
     std::vector<std::string> at;
@@ -251,6 +254,10 @@ Result<GetOptions> understood(const GetFlags& flags) {
     options.format = flags.format == "draco" ? ChunkFormat::draco : ChunkFormat::columns;
     if (options.obj && options.format != ChunkFormat::draco) {
         return fail(ErrorCode::invalid_argument, "--obj: columns have no mesh; use --format draco");
+    }
+    // Not CLI::Range, which lets NaN pass.
+    if (!(options.timeout_s >= kTimeoutMinS && options.timeout_s <= kTimeoutMaxS)) {
+        return fail(ErrorCode::invalid_argument, "--timeout: 0.001 to 86400 seconds are possible");
     }
     options.output = flags.output;
     return options;
@@ -286,7 +293,6 @@ void add_get_command(CLI::App& app, int& exit_code) {
     get->add_flag("--json", flags->options.json, "Print JSON in place of the table");
     get->add_option("--timeout", flags->options.timeout_s, "Give up after this long")
         ->type_name("SECONDS")
-        ->check(CLI::Range(0.001, 86400.0))
         ->capture_default_str();
     get->footer(
         "Chunks without a surface are empty or uniform: 0 bytes, and an empty file with -o.\n"

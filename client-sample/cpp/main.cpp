@@ -1,4 +1,8 @@
 // terrane-client: fetches chunks from a Terrane server and checks what it got.
-int main() {
-    return 2;
+//
+// Exit codes: 0 done, 1 failed, 2 wrong use.
+#include "client-sample/cpp/program.h"
+
+int main(int argc, char** argv) {
+    return terrane::run_client_program(argc, argv);
 }
