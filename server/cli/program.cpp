@@ -11,6 +11,7 @@ int run_program(int argc, char** argv) {
     app.require_subcommand(1);
     app.set_help_all_flag("--help-all", "Print the help of every subcommand");
     int exit_code = kExitDone;
+    add_serve_command(app, exit_code);
     add_world_command(app, exit_code);
     try {
         app.parse(argc, argv);

@@ -16,6 +16,7 @@ int run_program(int argc, char** argv);
 
 // Each adds one subcommand. Its callback stores the exit code in `exit_code`; `exit_code` and `app`
 // outlive the parse.
+void add_serve_command(CLI::App& app, int& exit_code);
 void add_world_command(CLI::App& app, int& exit_code);
 
 }  // namespace terrane
