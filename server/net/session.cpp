@@ -104,7 +104,8 @@ void Session::handle_one(const ChunkRequest& request) {
                              .format = request.format,
                              .without_flow = request.without_flow},
              .known_etag = request.known_etags.empty() ? Hash128{} : request.known_etags[i],
-             .priority = request.priority});
+             .priority = request.priority,
+             .rank = {}});
     }
     submit();
 }
@@ -137,7 +138,11 @@ void Session::handle_one(const ChunkCancel& cancel) {
 }
 
 void Session::handle_one(const ColumnQuery& query) {
-    add({.request_id = query.request_id, .key = query.column, .known_etag = {}, .priority = 0});
+    add({.request_id = query.request_id,
+         .key = query.column,
+         .known_etag = {},
+         .priority = 0,
+         .rank = {}});
     submit();
 }
 
@@ -170,9 +175,9 @@ void Session::add(Wish wish) {
                                     " keys of this session are in flight, which is the most"});
         return;
     }
-    const Rank rank{.urgency = -static_cast<std::int64_t>(wish.priority),
-                    .sequence = next_sequence_++};
-    waiting_.emplace(rank, std::move(wish));
+    wish.rank = {.urgency = -static_cast<std::int64_t>(wish.priority),
+                 .sequence = next_sequence_++};
+    waiting_.emplace(wish.rank, std::move(wish));
 }
 
 bool Session::has_room() const {
@@ -217,8 +222,12 @@ void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
     if (found == under_way_.end()) {
         return;  // cancelled in the meantime
     }
-    const Wish wish = std::move(found->second);
+    Wish wish = std::move(found->second);
     under_way_.erase(found);
+    if (result && outbox_.full() && std::holds_alternative<ServedChunk>(*result)) {
+        waiting_.emplace(wish.rank, std::move(wish));
+        return;
+    }
     answer(wish, result);
     submit();
 }

@@ -88,19 +88,20 @@ class Session : public std::enable_shared_from_this<Session> {
   private:
     enum class Stage : std::uint8_t { hello, open, finishing, closing, dead };
 
+    struct Rank {
+        std::int64_t urgency = 0;  ///< the priority negated
+        std::uint64_t sequence = 0;
+
+        friend auto operator<=>(const Rank&, const Rank&) = default;
+    };
+
     /// One key or column that has no answer yet.
     struct Wish {
         std::uint32_t request_id = 0;
         WorkKey key;
         Hash128 known_etag;  ///< zero: none
         std::int32_t priority = 0;
-    };
-
-    struct Rank {
-        std::int64_t urgency = 0;  ///< the priority negated
-        std::uint64_t sequence = 0;
-
-        friend auto operator<=>(const Rank&, const Rank&) = default;
+        Rank rank;  ///< given by `add`
     };
 
     void process(Clock::time_point now);

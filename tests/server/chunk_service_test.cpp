@@ -1,49 +1,15 @@
 // The service's decisions, with a build step that the test lets through one task at a time.
 #include "server/chunks/chunk_service.h"
 
+#include "tests/server/gated_step.h"
+
 #include <gtest/gtest.h>
 
 #include <latch>
-#include <semaphore>
-#include <stdexcept>
 #include <thread>
 
 namespace terrane {
 namespace {
-
-/// A build step that tells when it has begun and waits to be let through.
-struct Gate {
-    std::counting_semaphore<> begun{0};
-    std::counting_semaphore<> passes{0};
-    std::atomic<int> builds{0};
-    std::atomic<bool> open{true};
-
-    std::function<BuildStep()> maker() {
-        return [this] {
-            return [this](const Task& task) -> Result<Answer> {
-                ++builds;
-                if (!open) {
-                    begun.release();
-                    passes.acquire();
-                }
-                if (task.stop.stop_requested()) {
-                    return fail(ErrorCode::cancelled, "stopped");
-                }
-                if (const auto* column = std::get_if<ColumnPos>(&task.key)) {
-                    return ServedColumn{.column = *column, .limits = nullptr};
-                }
-                const auto key = std::get<ChunkKey>(task.key);
-                if (key.position.y == 666) {
-                    throw std::runtime_error("thrown on purpose");
-                }
-                return ServedChunk{.key = key,
-                                   .chunk = std::make_shared<const EncodedChunk>(),
-                                   .source = ChunkSource::generated,
-                                   .timings = {}};
-            };
-        };
-    }
-};
 
 /// Collects answers; `wait` blocks until that many have come.
 class Inbox {
