@@ -15,6 +15,9 @@ namespace {
 constexpr std::string_view kRangeAllowed =
     "it must be [least, best, most], three numbers with 0 <= least <= best <= most <= 1";
 
+/// A key this near to a missing one is taken for a slip of the pen.
+constexpr std::size_t kSlipEditsMax = 3;
+
 std::size_t edit_distance(std::string_view a, std::string_view b) {
     a = a.substr(0, kQuotedBytesMax);
     b = b.substr(0, kQuotedBytesMax);
@@ -160,7 +163,7 @@ const toml::node* WorldTable::present(std::string_view key, std::string_view all
     known_.emplace_back(key);
     const toml::node* node = table_.get(key);
     if (node == nullptr && need == Need::required) {
-        fault(key, "is missing; " + std::string(allowed));
+        missing_.emplace(key, allowed);
     }
     return node;
 }
@@ -293,11 +296,20 @@ const toml::array* WorldTable::array(std::string_view key, std::string_view allo
 
 void WorldTable::finish() {
     for (const auto& [key, value] : table_) {
-        if (std::find(known_.begin(), known_.end(), key.str()) == known_.end()) {
-            faults_.add(key.source(), full_key(key.str()),
-                        "is not a known key; the nearest known one is " +
-                            in_quotes(nearest_word(key.str(), known_)));
+        if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) {
+            continue;
         }
+        const std::string_view nearest = nearest_word(key.str(), known_);
+        std::string message = "is not a known key; the nearest known one is " + in_quotes(nearest);
+        const auto missing = missing_.find(nearest);
+        if (missing != missing_.end() && edit_distance(key.str(), nearest) <= kSlipEditsMax) {
+            message += ", which is missing; " + missing->second;
+            missing_.erase(missing);
+        }
+        faults_.add(key.source(), full_key(key.str()), std::move(message));
+    }
+    for (const auto& [key, allowed] : missing_) {
+        fault(key, "is missing; " + allowed);
     }
 }
 

@@ -11,6 +11,8 @@
 #include <toml++/toml.h>
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -79,7 +81,8 @@ class WorldTable {
     const toml::table* table(std::string_view key, std::string_view allowed, Need need);
     const toml::array* array(std::string_view key, std::string_view allowed, Need need);
 
-    /// Notes every key that was never asked for.
+    /// Notes every key that was never asked for and every required one that is not there. A key
+    /// that is nearly a missing one is one fault, not two.
     void finish();
 
     /// Where a key's value stands; the table's own place if it has none.
@@ -98,6 +101,7 @@ class WorldTable {
     std::string path_;
     WorldFaults& faults_;
     std::vector<std::string> known_;
+    std::map<std::string, std::string, std::less<>> missing_;  ///< what is allowed, by key
 };
 
 /// 0 to 1, or -1 for "never together".
