@@ -321,11 +321,13 @@ TEST(Session, SendsTheUrgentFirst) {
     Fixture f(1000, false);
     f.hello();
     std::vector<ChunkPos> many;
+    std::vector<ChunkPos> more;
     for (std::int32_t i = 0; i < 64; ++i) {
         many.push_back(at(i));
+        more.push_back(at(100 + i));
     }
     f.request(1, many);
-    f.request(2, many);
+    f.request(2, more);
     f.request(3, {at(1000)}, {}, 5);
     f.gate.passes.release(10000);
     std::vector<std::uint32_t> order;
