@@ -13,6 +13,8 @@ int run_program(int argc, char** argv) {
     int exit_code = kExitDone;
     add_serve_command(app, exit_code);
     add_world_command(app, exit_code);
+    add_column_command(app, exit_code);
+    add_slice_command(app, exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
