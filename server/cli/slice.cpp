@@ -26,8 +26,9 @@ constexpr std::int64_t kGoodScaleMax = 12;
 
 constexpr Rgb8 kSkyAtTop = {.r = 118, .g = 170, .b = 222};
 constexpr Rgb8 kSkyAtGround = {.r = 226, .g = 238, .b = 246};
-constexpr Rgb8 kCaveDark = {.r = 16, .g = 12, .b = 20};
-constexpr float kCaveTint = 0.06F;  ///< of the cave's own colour
+// Caves are dark but for a glimmer on the floor, which tells them from black rock.
+constexpr Rgb8 kCaveFloor = {.r = 66, .g = 56, .b = 72};
+constexpr Rgb8 kCaveDark = {.r = 13, .g = 10, .b = 17};
 
 /// A limit with what it looks like.
 struct SeenLimit {
@@ -42,13 +43,6 @@ LinearColor mix(LinearColor a, LinearColor b, float share) {
     return {.r = a.r + (b.r - a.r) * share,
             .g = a.g + (b.g - a.g) * share,
             .b = a.b + (b.b - a.b) * share};
-}
-
-/// Caves are holes without light: nearly black, whatever colour the file gives them.
-LinearColor seen_color(const PaletteEntry& entry, std::span<const Material> materials) {
-    const LinearColor color = color_of(entry.composition.shares(), materials);
-    return entry.kind == PaletteKind::cave ? mix(linear_from_srgb(kCaveDark), color, kCaveTint)
-                                           : color;
 }
 
 /// Part of a line's columns, and the rectangle around them that is generated at once.
@@ -104,7 +98,7 @@ Result<std::vector<SeenColumn>> see_columns(const World& world,
                 const PaletteEntry& entry = set.palette[limit.palette_id];
                 column.push_back({.y256 = limit.y256,
                                   .kind = entry.kind,
-                                  .color = seen_color(entry, materials)});
+                                  .color = color_of(entry.composition.shares(), materials)});
             }
             seen.push_back(std::move(column));
         }
@@ -136,8 +130,8 @@ std::int64_t good_scale(std::int64_t columns, std::int64_t voxels) {
 std::vector<Rgb8> sky_rows(std::int32_t height) {
     std::vector<Rgb8> rows;
     for (std::int32_t row = 0; row < height; ++row) {
-        // The terrain takes most of the height, so the gradient runs over the upper half.
-        const float down = std::min(1.0F, static_cast<float>(row) * 2 / static_cast<float>(height));
+        // The terrain takes most of the height, so the gradient runs over the upper third.
+        const float down = std::min(1.0F, static_cast<float>(row) * 3 / static_cast<float>(height));
         rows.push_back(srgb_from_linear(
             mix(linear_from_srgb(kSkyAtTop), linear_from_srgb(kSkyAtGround), down)));
     }
@@ -164,7 +158,11 @@ void draw_column(Image& image, std::int32_t x, const SeenColumn& column, std::in
         const float share = hi.y256 > lo.y256 ? static_cast<float>(y256 - lo.y256) /
                                                     static_cast<float>(hi.y256 - lo.y256)
                                               : 0.0F;
-        image.at(x, row) = srgb_from_linear(mix(lo.color, hi.color, share));
+        const bool cave = lo.kind == PaletteKind::cave;
+        image.at(x, row) =
+            srgb_from_linear(cave ? mix(linear_from_srgb(kCaveFloor), linear_from_srgb(kCaveDark),
+                                        std::min(1.0F, 2 * share))
+                                  : mix(lo.color, hi.color, share));
     }
 }
 
