@@ -14,6 +14,10 @@ namespace {
 constexpr std::string_view kPairAllowed =
     "it must be [\"material\", \"material\", affinity], the affinity from 0 to 1 or -1";
 
+/// Looking for the nearest of many names is slow: a file full of unknown ones must not take
+/// minutes.
+constexpr std::size_t kSuggestionsMax = 64;
+
 using MaterialIndex = std::map<std::string, std::size_t, std::less<>>;
 using Pair = std::pair<std::size_t, std::size_t>;
 
@@ -94,8 +98,11 @@ class AffinityList {
         }
         const auto found = index_.find(name->get());
         if (found == index_.end()) {
-            fault(node, in_quotes(name->get()) + " is no material; the nearest is " +
-                            in_quotes(nearest_word(name->get(), names_)));
+            const bool suggest = ++unknown_names_ <= kSuggestionsMax;
+            fault(node,
+                  in_quotes(name->get()) + " is no material" +
+                      (suggest ? "; the nearest is " + in_quotes(nearest_word(name->get(), names_))
+                               : std::string()));
             return std::nullopt;
         }
         return found->second;
@@ -110,6 +117,7 @@ class AffinityList {
     const MaterialIndex& index_;
     WorldFaults& faults_;
     std::vector<std::string> names_;
+    std::size_t unknown_names_ = 0;
     std::map<Pair, double> pairs_;
 };
 
