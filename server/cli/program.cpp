@@ -11,7 +11,9 @@ int run_program(int argc, char** argv) {
     app.require_subcommand(1);
     app.set_help_all_flag("--help-all", "Print the help of every subcommand");
     int exit_code = kExitDone;
+    add_preseed_command(app, exit_code);
     add_serve_command(app, exit_code);
+    add_verify_command(app, exit_code);
     add_world_command(app, exit_code);
     add_column_command(app, exit_code);
     add_slice_command(app, exit_code);

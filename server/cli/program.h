@@ -16,7 +16,9 @@ int run_program(int argc, char** argv);
 
 // Each adds one subcommand. Its callback stores the exit code in `exit_code`; `exit_code` and `app`
 // outlive the parse.
+void add_preseed_command(CLI::App& app, int& exit_code);
 void add_serve_command(CLI::App& app, int& exit_code);
+void add_verify_command(CLI::App& app, int& exit_code);
 void add_world_command(CLI::App& app, int& exit_code);
 void add_column_command(CLI::App& app, int& exit_code);
 void add_slice_command(CLI::App& app, int& exit_code);
