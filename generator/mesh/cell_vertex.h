@@ -8,10 +8,8 @@
 
 #include "generator/mesh/solid_mask.h"
 
-#include <glm/vec3.hpp>
-
-#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,120 +18,223 @@ namespace terrane {
 
 using Lanes = std::int32_t __attribute__((vector_size(16)));
 using FloatLanes = float __attribute__((vector_size(16)));
+using HalfLanes = std::int16_t __attribute__((vector_size(16)));
 
-/// A cell's eight corners. Masks are -1 for yes and 0 for no.
-struct CellCorners {
-    Lanes low{};         ///< signed vertical distance to the nearest end at the floor, clamped
-    Lanes high{};        ///< the same at the ceiling
-    Lanes solid_low{};   ///< mask
-    Lanes solid_high{};  ///< mask
-    Lanes crossing{};    ///< height above the floor where the column's own edge crosses, if it does
-};
+// What x86 does in one instruction and the vectors of the compilers do not offer by name.
 
-/// Offsets are 0..255 from the cell's least corner, in 1/256 voxel.
-struct CellVertex {
-    glm::i32vec3 offset256{};
-    glm::vec3 normal{};
-};
+/// The lanes of a, then those of b, each kept within 16 bits.
+inline HalfLanes narrowed(Lanes a, Lanes b) {
+#ifdef __SSE2__
+    return std::bit_cast<HalfLanes>(__builtin_ia32_packssdw128(a, b));
+#else
+    const auto within = [](Lanes lanes) {
+        const Lanes most = Lanes{} + INT16_MAX;
+        const Lanes low = lanes < most ? lanes : most;
+        return low > -most ? low : -most;
+    };
+    a = within(a);
+    b = within(b);
+    HalfLanes all{};
+    for (int i = 0; i < 4; ++i) {
+        all[i] = static_cast<std::int16_t>(a[i]);
+        all[i + 4] = static_cast<std::int16_t>(b[i]);
+    }
+    return all;
+#endif
+}
 
-inline Lanes clamped_distance(Lanes distance) {
-    const Lanes most = Lanes{} + kDistanceMax256;
-    const Lanes clamped = distance < most ? distance : most;
-    return clamped > -most ? clamped : -most;
+/// Products of neighbouring lanes, added two and two.
+inline Lanes paired(HalfLanes a, HalfLanes b) {
+#ifdef __SSE2__
+    return std::bit_cast<Lanes>(__builtin_ia32_pmaddwd128(a, b));
+#else
+    Lanes sums{};
+    for (int i = 0; i < 4; ++i) {
+        sums[i] = a[2 * i] * b[2 * i] + a[2 * i + 1] * b[2 * i + 1];
+    }
+    return sums;
+#endif
 }
 
 /// Bit i is set where lane i of a mask is.
 inline unsigned bits_of(Lanes mask) {
+#ifdef __SSE2__
+    return static_cast<unsigned>(__builtin_ia32_movmskps(std::bit_cast<FloatLanes>(mask)));
+#else
     return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2) | (mask[2] & 4) | (mask[3] & 8));
+#endif
 }
 
-/// Corners of a cell whose columns are solid below their tops, seen from its floor at y256 = 0.
-inline CellCorners corners_below_tops(Lanes top256) {
-    return {.low = clamped_distance(top256),
-            .high = clamped_distance(top256 - kUnitsPerVoxel),
-            .solid_low = top256 >= 0,
-            .solid_high = top256 >= kUnitsPerVoxel,
-            .crossing = top256};
+/// The same for lanes 0..3 of eight.
+inline unsigned bits_of(HalfLanes mask) {
+    return bits_of(__builtin_convertvector(__builtin_shufflevector(mask, mask, 0, 1, 2, 3), Lanes));
 }
 
-inline glm::vec3 unit_normal(std::int32_t x, std::int32_t y, std::int32_t z) {
-    const std::int32_t square = x * x + y * y + z * z;  // at most 3 * (8 * 1024)^2
-    if (square == 0) {
-        return {0.0F, 1.0F, 0.0F};
+/// The four lanes' sums, in order.
+inline Lanes sums_of(Lanes a, Lanes b, Lanes c, Lanes d) {
+    const Lanes ab =
+        __builtin_shufflevector(a, b, 0, 4, 1, 5) + __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Lanes cd =
+        __builtin_shufflevector(c, d, 0, 4, 1, 5) + __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    return __builtin_shufflevector(ab, cd, 0, 1, 4, 5) +
+           __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+}
+
+/// A cell's eight corners: the four columns at its floor, then at its ceiling.
+struct CellCorners {
+    HalfLanes distance{};  ///< signed vertical distance to the nearest end, clamped
+    HalfLanes solid{};     ///< mask: -1 for yes and 0 for no
+    /// Four columns: the height above the floor where the column's own edge crosses, if it does.
+    HalfLanes crossing{};
+};
+
+struct CellVertex {
+    Lanes offset256{};    ///< x, y, z in 0..255 from the cell's least corner, in 1/256 voxel
+    FloatLanes normal{};  ///< x, y, z; unit length
+};
+
+/// Corners of a cell whose columns have one end each, seen from its floor at y256 = 0.
+inline CellCorners corners_of_one_end(Lanes end256) {
+    const HalfLanes most = HalfLanes{} + static_cast<std::int16_t>(kDistanceMax256);
+    const HalfLanes raw = narrowed(end256, end256 - kUnitsPerVoxel);
+    const HalfLanes low = raw < most ? raw : most;
+    return {.distance = low > -most ? low : -most, .solid = raw >= 0, .crossing = raw};
+}
+
+/// Adds one more end a column; `distance` must not have its sign yet.
+inline void add_end(CellCorners& corners, const CellCorners& end) {
+    using Unsigned = std::uint16_t __attribute__((vector_size(16)));
+    const HalfLanes distance = end.distance < 0 ? -end.distance : end.distance;
+    corners.distance = distance < corners.distance ? distance : corners.distance;
+    corners.solid ^= ~end.solid;
+    // The lowest end that is not below the floor: those below are the largest without a sign.
+    const auto known = std::bit_cast<Unsigned>(corners.crossing);
+    const auto added = std::bit_cast<Unsigned>(end.crossing);
+    corners.crossing = std::bit_cast<HalfLanes>(added < known ? added : known);
+}
+
+/// The same for columns of any number of ends; `end256(i)` is end i of the four columns.
+template <typename EndsAt>
+CellCorners corners_of_ends(std::size_t count, EndsAt end256) {
+    CellCorners corners = corners_of_one_end(end256(0));
+    corners.distance = corners.distance < 0 ? -corners.distance : corners.distance;
+    for (std::size_t i = 1; i < count; ++i) {
+        add_end(corners, corners_of_one_end(end256(i)));
     }
-    const float scale = 1.0F / std::sqrt(static_cast<float>(square));
-    return {static_cast<float>(x) * scale, static_cast<float>(y) * scale,
-            static_cast<float>(z) * scale};
+    corners.distance = (corners.distance ^ ~corners.solid) - ~corners.solid;
+    return corners;
 }
 
-/// Against the gradient of the distance, which grows into the solid.
-inline glm::vec3 normal_of(Lanes low, Lanes high) {
-    const Lanes sum = low + high;
-    const Lanes fall = low - high;
-    return unit_normal(sum[0] - sum[1] + sum[2] - sum[3], fall[0] + fall[1] + fall[2] + fall[3],
-                       sum[0] + sum[1] - sum[2] - sum[3]);
+/// Masks of the upright edges that cross, in lanes 0..3; the other lanes are 0.
+inline HalfLanes crossed_upright(const CellCorners& c) {
+    const HalfLanes differs =
+        c.solid ^ __builtin_shufflevector(c.solid, c.solid, 4, 5, 6, 7, 0, 1, 2, 3);
+    return differs & HalfLanes{-1, -1, -1, -1, 0, 0, 0, 0};
 }
 
-/// Where the edges from corners at distance `from` to corners at distance `to` cross, in 1/256 of
-/// the edge; 0 where `crosses` is not set. Half way if both ends are 0.
-inline Lanes crossings256(Lanes from, Lanes to, Lanes crosses) {
-    const Lanes length = from - to;
-    const Lanes usable = crosses & (length != 0);
-    const FloatLanes numerator = __builtin_convertvector(from & usable, FloatLanes);
-    const FloatLanes denominator =
-        __builtin_convertvector(usable ? length : Lanes{} + 1, FloatLanes);
-    const Lanes at = __builtin_convertvector(numerator * 256.0F / denominator + 0.5F, Lanes);
-    return (at & usable) | (Lanes{128, 128, 128, 128} & crosses & ~usable);
+/// Against the gradient of the distance, which grows into the solid; up where there is none.
+inline FloatLanes normal_of(HalfLanes distance) {
+    constexpr HalfLanes kX = {1, -1, 1, -1, 1, -1, 1, -1};
+    constexpr HalfLanes kY = {1, 1, 1, 1, -1, -1, -1, -1};
+    constexpr HalfLanes kZ = {1, 1, -1, -1, 1, 1, -1, -1};
+    Lanes fall = sums_of(paired(distance, kX), paired(distance, kY), paired(distance, kZ), Lanes{});
+    Lanes squares = fall * fall;  // each at most (8 * 1024)^2
+    if (squares[0] + squares[1] + squares[2] == 0) [[unlikely]] {
+        fall = squares = Lanes{0, 1, 0, 0};
+    }
+    const auto square = static_cast<float>(squares[0] + squares[1] + squares[2]);
+    return __builtin_convertvector(fall, FloatLanes) * (1.0F / std::sqrt(square));
 }
 
-inline std::int32_t sum_of(Lanes lanes) {
-    return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+/// Where edges from corners at distance `from` to corners `length` less far in cross, in 1/256 of
+/// the edge. Needs: length != 0 and of the sign of `from` where the answer matters.
+inline Lanes crossings256(Lanes from, Lanes length) {
+    const FloatLanes numerator = __builtin_convertvector(from, FloatLanes) * 256.0F;
+    return __builtin_convertvector(numerator / __builtin_convertvector(length, FloatLanes) + 0.5F,
+                                   Lanes);
+}
+
+/// The same for eight edges, with half way where both ends are at distance 0.
+inline HalfLanes crossings256(HalfLanes from, HalfLanes to) {
+    const HalfLanes length = from - to;
+    const HalfLanes is_level = length == 0;
+    const auto low = [](HalfLanes lanes) {
+        return __builtin_convertvector(__builtin_shufflevector(lanes, lanes, 0, 1, 2, 3), Lanes);
+    };
+    const auto high = [](HalfLanes lanes) {
+        return __builtin_convertvector(__builtin_shufflevector(lanes, lanes, 4, 5, 6, 7), Lanes);
+    };
+    const HalfLanes divisor = length - is_level;  // 1 instead of 0
+    const HalfLanes at =
+        narrowed(crossings256(low(from), low(divisor)), crossings256(high(from), high(divisor)));
+    return at + (is_level & static_cast<std::int16_t>(kUnitsPerVoxel / 2));
+}
+
+/// sum / count for whole sums of at most 12 * 256 and counts of 1..12, rounded as (sum + count / 2)
+/// / count, by multiplication: 65536 / count rounded up errs by less than 4096 / 65536 in all, and
+/// whole numbers over 12 keep more than that from the next.
+inline Lanes rounded_means(Lanes sums, std::int32_t count) {
+    static constexpr std::array<std::int32_t, 13> kReciprocals = [] {
+        std::array<std::int32_t, 13> reciprocals{};
+        for (std::int32_t i = 1; i <= 12; ++i) {
+            reciprocals[static_cast<std::size_t>(i)] = (65536 + i - 1) / i;
+        }
+        return reciprocals;
+    }();
+    return (sums + count / 2) * kReciprocals[static_cast<std::size_t>(count)] >> 16;
 }
 
 /// Needs: at least one crossing edge.
 inline CellVertex cell_vertex(const CellCorners& c) {
-    constexpr Lanes kOddAtFar = {0, kUnitsPerVoxel, 0, kUnitsPerVoxel};
-    constexpr Lanes kLastAtFar = {0, 0, kUnitsPerVoxel, kUnitsPerVoxel};
-    const Lanes upright = c.solid_low ^ c.solid_high;
-    // Edges along x, two at the floor and two at the ceiling: columns 0 to 1 and 2 to 3; edges
-    // along z: columns 0 to 2 and 1 to 3.
-    const auto even = [](Lanes a, Lanes b) { return __builtin_shufflevector(a, b, 0, 2, 4, 6); };
-    const auto odd = [](Lanes a, Lanes b) { return __builtin_shufflevector(a, b, 1, 3, 5, 7); };
-    const auto first = [](Lanes a, Lanes b) { return __builtin_shufflevector(a, b, 0, 1, 4, 5); };
-    const auto last = [](Lanes a, Lanes b) { return __builtin_shufflevector(a, b, 2, 3, 6, 7); };
-    const Lanes along_x = even(c.solid_low, c.solid_high) ^ odd(c.solid_low, c.solid_high);
-    const Lanes along_z = first(c.solid_low, c.solid_high) ^ last(c.solid_low, c.solid_high);
-    const Lanes at_x = crossings256(even(c.low, c.high), odd(c.low, c.high), along_x);
-    const Lanes at_z = crossings256(first(c.low, c.high), last(c.low, c.high), along_z);
-
-    const std::int32_t x = sum_of((kOddAtFar & upright) + (kOddAtFar & along_z) + at_x);
-    const std::int32_t y =
-        sum_of((c.crossing & upright) + (kLastAtFar & along_x) + (kLastAtFar & along_z));
-    const std::int32_t z = sum_of((kLastAtFar & upright) + (kOddAtFar & along_x) + at_z);
-    const std::int32_t count = -sum_of(upright + along_x + along_z);
-    const auto mean = [count](std::int32_t sum) {
-        return std::min((sum + count / 2) / count, kUnitsPerVoxel - 1);
+    // Level edges: four along x, from columns 0 and 2 at the floor and at the ceiling, then four
+    // along z, from columns 0 and 1.
+    const auto starts = [](HalfLanes v) {
+        return __builtin_shufflevector(v, v, 0, 2, 4, 6, 0, 1, 4, 5);
     };
-    return {.offset256 = {mean(x), mean(y), mean(z)}, .normal = normal_of(c.low, c.high)};
+    const auto ends = [](HalfLanes v) {
+        return __builtin_shufflevector(v, v, 1, 3, 5, 7, 2, 3, 6, 7);
+    };
+    // Masks are -1, so what stands at the far side of a cell counts -256.
+    constexpr std::int16_t kFar = -kUnitsPerVoxel;
+    const HalfLanes level = starts(c.solid) ^ ends(c.solid);
+    const HalfLanes at = crossings256(starts(c.distance), ends(c.distance)) & level;
+    // Upright edges in lanes 0..3, and how high they cross in lanes 4..7.
+    const HalfLanes crossed = crossed_upright(c);
+    const HalfLanes upright =
+        __builtin_shufflevector(crossed, crossed & c.crossing, 0, 1, 2, 3, 8, 9, 10, 11);
+    const Lanes sums = sums_of(
+        paired(at, HalfLanes{1, 1, 1, 1, 0, 0, 0, 0}) +
+            paired(level, HalfLanes{0, 0, 0, 0, 0, kFar, 0, kFar}) +
+            paired(upright, HalfLanes{0, kFar, 0, kFar, 0, 0, 0, 0}),
+        paired(level, HalfLanes{0, 0, kFar, kFar, 0, 0, kFar, kFar}) +
+            paired(upright, HalfLanes{0, 0, 0, 0, 1, 1, 1, 1}),
+        paired(at, HalfLanes{0, 0, 0, 0, 1, 1, 1, 1}) +
+            paired(level, HalfLanes{0, kFar, 0, kFar, 0, 0, 0, 0}) +
+            paired(upright, HalfLanes{0, 0, kFar, kFar, 0, 0, 0, 0}),
+        paired(level, HalfLanes{} - 1) + paired(upright, HalfLanes{-1, -1, -1, -1, 0, 0, 0, 0}));
+    const Lanes means = rounded_means(sums, sums[3]);
+    const Lanes most = Lanes{} + (kUnitsPerVoxel - 1);
+    return {.offset256 = means < most ? means : most, .normal = normal_of(c.distance)};
 }
 
-/// The same for a cell whose four upright edges all cross at tops, its floor solid and its ceiling
-/// not: three vertices of four on open ground.
-inline CellVertex flat_cell_vertex(Lanes top256) {
-    return {.offset256 = {kUnitsPerVoxel / 2, (sum_of(top256) + 2) / 4, kUnitsPerVoxel / 2},
-            .normal =
-                unit_normal(2 * (top256[0] - top256[1] + top256[2] - top256[3]), 4 * kUnitsPerVoxel,
-                            2 * (top256[0] + top256[1] - top256[2] - top256[3]))};
+/// x, y, z of a position in 1/256 voxel, each without what is above 16 bits: enough for distances
+/// between vertices of neighbouring cells.
+using PackedPosition = std::uint64_t;
+
+inline PackedPosition packed_position(Lanes position) {
+    const Lanes wrapped = position << 16 >> 16;
+    using Pair = std::uint64_t __attribute__((vector_size(16)));
+    return std::bit_cast<Pair>(narrowed(wrapped, wrapped))[0];
 }
 
-/// A cell's corners near caves, and the compositions that show where its upright edges cross.
-struct CaveCell {
-    CellCorners corners;
-    std::array<std::uint16_t, 4> crossing_ids{};
-};
-
-/// Needs: `at`, the indices of the cell's columns in lane order.
-CaveCell cave_cell(const SolidColumns& columns, const std::array<std::size_t, 4>& at,
-                   std::int32_t floor256);
+/// True if a to b is not longer than c to d; all less than 128 voxels apart.
+inline bool is_first_shorter(PackedPosition a, PackedPosition b, PackedPosition c,
+                             PackedPosition d) {
+    using Pair = std::uint64_t __attribute__((vector_size(16)));
+    const HalfLanes apart =
+        std::bit_cast<HalfLanes>(Pair{a, c}) - std::bit_cast<HalfLanes>(Pair{b, d});
+    const Lanes squares = paired(apart, apart);
+    return squares[0] + squares[1] <= squares[2] + squares[3];
+}
 
 }  // namespace terrane

@@ -8,84 +8,81 @@
 namespace terrane {
 namespace {
 
-/// One bit a palette id; stacks have few compositions that are not solid.
-class SolidIds {
-  public:
-    explicit SolidIds(const Palette& palette) : palette_(palette) {
-        has_caves_ = std::any_of(palette.begin(), palette.end(), [](const PaletteEntry& entry) {
-            return entry.kind == PaletteKind::cave;
-        });
-    }
+/// What is solid, by palette id. The layers come first in a palette, so most ids need no look-up.
+struct SolidIds {
+    const Palette& palette;
+    std::uint16_t layers = 0;
 
-    bool has_caves() const { return has_caves_; }
+    explicit SolidIds(const Palette& entries) : palette(entries) {
+        while (layers < palette.size() && palette[layers].kind == PaletteKind::layer) {
+            ++layers;
+        }
+    }
 
     bool is_solid(std::uint16_t id) const {
-        TERRANE_DEBUG_ASSERT(id < palette_.size());
-        return palette_[id].is_solid();
+        TERRANE_DEBUG_ASSERT(id < palette.size());
+        return id < layers || palette[id].is_solid();
     }
-
-  private:
-    const Palette& palette_;
-    bool has_caves_ = false;
 };
 
-/// True if the whole column is one interval that ends at its last limit, as all are without caves.
-bool is_plain(std::span<const Limit> limits, const SolidIds& ids) {
-    const std::size_t last = limits.size() - 1;
-    if (last == 0 || limits[last].y256 != limits[last - 1].y256 ||
-        ids.is_solid(limits[last].palette_id)) {
-        return false;
-    }
-    if (!ids.has_caves()) {
-        return ids.is_solid(limits[last - 1].palette_id);
-    }
-    return std::all_of(limits.begin(), limits.end() - 1,
-                       [&ids](const Limit& limit) { return ids.is_solid(limit.palette_id); });
-}
-
-/// Appends the column's intervals at `next` and returns the end.
-SolidInterval* append_intervals(SolidInterval* next, std::span<const Limit> limits,
-                                const SolidIds& ids) {
-    const Limit& first = limits.front();
-    *next = {.bottom256 = kGroundBottom256,
-             .top256 = first.y256,
-             .bottom_id = first.palette_id,
-             .top_id = first.palette_id};
-    bool is_open = true;
-    for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
+/// Appends the column's ends to `out`.
+void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits, const SolidIds& ids) {
+    bool is_solid = true;  // the ground
+    for (std::size_t i = 0; i < limits.size(); ++i) {
         const Limit& low = limits[i];
-        const Limit& high = limits[i + 1];
-        if (low.y256 >= high.y256) {
-            continue;
+        const bool is_last = i + 1 == limits.size();
+        if (!is_last && low.y256 >= limits[i + 1].y256) {
+            continue;  // no height between them
         }
-        if (!ids.is_solid(low.palette_id) || !ids.is_solid(high.palette_id)) {
-            next += is_open ? 1 : 0;
-            is_open = false;
-            continue;
+        const bool is_solid_above =
+            !is_last && ids.is_solid(low.palette_id) && ids.is_solid(limits[i + 1].palette_id);
+        if (is_solid_above != is_solid) {
+            // A top shows what is under it: the first limit at its height.
+            std::size_t shown = i;
+            while (is_solid && shown > 0 && limits[shown - 1].y256 == low.y256) {
+                --shown;
+            }
+            out.push_back({.y256 = low.y256, .palette_id = limits[shown].palette_id});
+            is_solid = is_solid_above;
         }
-        if (!is_open) {
-            next->bottom256 = low.y256;
-            next->bottom_id = low.palette_id;
-            is_open = true;
-        }
-        next->top256 = high.y256;
-        next->top_id = high.palette_id;
     }
-    return next + (is_open ? 1 : 0);
 }
 
-/// Bits [first, last) of `words` words, `stride` apart; first may lie below 0, last above the end.
-void set_points(std::uint64_t* out, std::size_t stride, std::size_t words, std::int64_t first,
-                std::int64_t last) {
-    for (std::size_t word = 0; word < words; ++word) {
-        const std::int64_t base = static_cast<std::int64_t>(word) * 64;
-        const auto from = static_cast<unsigned>(std::clamp<std::int64_t>(first - base, 0, 64));
-        const auto to = static_cast<unsigned>(std::clamp<std::int64_t>(last - base, 0, 64));
-        const auto below = [](unsigned count) {
-            return count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
-        };
-        out[word * stride] |= below(to) & ~below(from);
+/// Fills the planes above the first from the columns of many ends, and corrects what was taken from
+/// the tops alone.
+void fill_planes(SolidColumns& out) {
+    const std::size_t count = out.column_count();
+    std::size_t most = 1;
+    for (std::size_t i = 0; i < out.many.size(); i += 2) {
+        most = std::max<std::size_t>(most, out.many[i + 1]);
     }
+    out.plane_count = most;
+    out.planes256.resize(most * count);
+    out.plane_ids.resize(most * count);
+    std::copy(out.top256.begin(), out.top256.end(), out.planes256.begin());
+    std::copy(out.top_id.begin(), out.top_id.end(), out.plane_ids.begin());
+    std::fill(out.planes256.begin() + static_cast<std::ptrdiff_t>(count), out.planes256.end(),
+              kEndlessly256);
+    std::fill(out.plane_ids.begin() + static_cast<std::ptrdiff_t>(count), out.plane_ids.end(),
+              std::uint16_t{0});
+    const SolidEnd* end = out.many_ends.data();
+    for (std::size_t i = 0; i < out.many.size(); i += 2) {
+        const std::size_t column = out.many[i];
+        const std::size_t ends = out.many[i + 1];
+        for (std::size_t plane = 0; plane < ends; ++plane, ++end) {
+            out.planes256[plane * count + column] = end->y256;
+            out.plane_ids[plane * count + column] = end->palette_id;
+        }
+        out.lowest256 = std::min(out.lowest256, out.planes256[column]);
+    }
+}
+
+/// Bits 0..count-1, for any count.
+std::uint64_t lowest_bits(std::int32_t count) {
+    if (count <= 0) {
+        return 0;
+    }
+    return ~std::uint64_t{0} >> (64 - std::min(count, 64));
 }
 
 }  // namespace
@@ -94,40 +91,55 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
     const ColumnGrid& grid = stack.columns;
     TERRANE_ASSERT(grid.width == stack.side + 2 && grid.length == stack.side + 2);
     out.width = static_cast<std::size_t>(grid.width);
-    const std::size_t count = out.width * out.width;
-    out.offsets.resize(count + 1);
-    out.intervals.resize(grid.limits.size() / 2 + count);  // an interval has two limits of its own
+    const std::size_t count = out.column_count();
     out.top256.resize(count);
     out.top_id.resize(count);
     out.simple_from256.resize(count);
+    out.many.clear();
+    out.many_ends.clear();
     const SolidIds ids(stack.palette);
-    std::int32_t lowest = INT32_MAX;
-    std::int32_t highest = INT32_MIN;
-    SolidInterval* next = out.intervals.data();
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto limits =
-            std::span(grid.limits).subspan(grid.offsets[i], grid.offsets[i + 1] - grid.offsets[i]);
-        SolidInterval* const first = next;
-        out.offsets[i] = static_cast<std::uint32_t>(first - out.intervals.data());
-        if (is_plain(limits, ids)) {
-            const Limit& top = limits[limits.size() - 2];
-            *next++ = {.bottom256 = kGroundBottom256,
-                       .top256 = top.y256,
-                       .bottom_id = limits.front().palette_id,
-                       .top_id = top.palette_id};
-        } else {
-            next = append_intervals(next, limits, ids);
-        }
-        const SolidInterval& topmost = next[-1];
-        out.top256[i] = topmost.top256;
-        out.top_id[i] = topmost.top_id;
-        out.simple_from256[i] = topmost.bottom256 + kDistanceMax256;
-        lowest = std::min(lowest, first->top256);
-        highest = std::max(highest, topmost.top256);
+    // Nearly all limits show layers; the others are listed first, without a jump for each.
+    out.not_layers.resize(grid.limits.size() + 1);
+    std::uint32_t* const others = out.not_layers.data();
+    std::size_t others_count = 0;
+    for (std::uint32_t i = 0; i < grid.limits.size(); ++i) {
+        others[others_count] = i;
+        others_count += grid.limits[i].palette_id >= ids.layers ? 1U : 0U;
     }
-    out.offsets[count] = static_cast<std::uint32_t>(next - out.intervals.data());
-    out.lowest256 = lowest;
-    out.highest256 = highest;
+    others[others_count] = UINT32_MAX;
+
+    out.lowest256 = INT32_MAX;
+    out.highest256 = INT32_MIN;
+    const std::uint32_t* other = others;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t begin = grid.offsets[i];
+        const std::uint32_t end = grid.offsets[i + 1];
+        const Limit* const last = grid.limits.data() + end - 1;
+        SolidEnd top = {.y256 = last->y256,
+                        .palette_id = last[begin < end - 1 ? -1 : 0].palette_id};
+        std::int32_t bottom256 = -kEndlessly256;
+        // Layers up to the top and void above: one end. Anything else is read limit by limit.
+        const bool is_plain = *other == end - 1 && end - begin > 1 && last[-1].y256 == last->y256 &&
+                              !ids.is_solid(last->palette_id);
+        if (!is_plain) {
+            const std::size_t before = out.many_ends.size();
+            append_ends(out.many_ends, std::span(grid.limits).subspan(begin, end - begin), ids);
+            const std::size_t ends = out.many_ends.size() - before;
+            out.many.push_back(static_cast<std::uint32_t>(i));
+            out.many.push_back(static_cast<std::uint32_t>(ends));
+            top = out.many_ends.back();
+            bottom256 = ends > 1 ? out.many_ends[out.many_ends.size() - 2].y256 : bottom256;
+        }
+        while (*other < end) {
+            ++other;
+        }
+        out.top256[i] = top.y256;
+        out.top_id[i] = top.palette_id;
+        out.simple_from256[i] = bottom256 + kDistanceMax256;
+        out.lowest256 = std::min(out.lowest256, top.y256);
+        out.highest256 = std::max(out.highest256, top.y256);
+    }
+    fill_planes(out);
 }
 
 void fill_solid_mask(SolidMask& out, const SolidColumns& columns, std::int32_t y_first,
@@ -135,15 +147,19 @@ void fill_solid_mask(SolidMask& out, const SolidColumns& columns, std::int32_t y
     out.y_first = y_first;
     out.words = words;
     out.width = columns.width;
-    out.bits.assign(columns.width * columns.width * words, 0);
+    out.bits.resize(columns.column_count() * words);
     for (std::size_t z = 0; z < columns.width; ++z) {
-        for (std::size_t x = 0; x < columns.width; ++x) {
-            std::uint64_t* const bits = out.bits.data() + z * words * columns.width + x;
-            for (const SolidInterval& interval : columns.column(z * columns.width + x)) {
-                // The points above an end at y256 begin at floor(y256 / 256) + 1.
-                set_points(bits, columns.width, words,
-                           std::int64_t{interval.bottom256 >> 8} + 1 - y_first,
-                           std::int64_t{interval.top256 >> 8} + 1 - y_first);
+        for (std::size_t word = 0; word < words; ++word) {
+            std::uint64_t* const bits = out.bits.data() + (z * words + word) * columns.width;
+            const std::int32_t base = y_first + static_cast<std::int32_t>(word) * 64;
+            // The points up to an end are those up to floor(y256 / 256); every further end turns
+            // the points under it over, and ends that are not there do so an even number of times.
+            for (std::size_t plane = 0; plane < columns.plane_count; ++plane) {
+                const std::int32_t* const ends256 = columns.plane256(plane) + z * columns.width;
+                for (std::size_t x = 0; x < columns.width; ++x) {
+                    const std::uint64_t points = lowest_bits((ends256[x] >> 8) + 1 - base);
+                    bits[x] = plane == 0 ? points : bits[x] ^ points;
+                }
             }
         }
     }

@@ -16,40 +16,57 @@
 
 namespace terrane {
 
-/// The bottom of a column's lowest interval: minus infinity, with room to subtract heights from it.
-inline constexpr std::int32_t kGroundBottom256 = -(1 << 30);
-
 /// Beyond this distance from the nearest end all depths count alike: 4 voxels, in 1/256 voxel.
 inline constexpr std::int32_t kDistanceMax256 = 4 * kUnitsPerVoxel;
 
-/// Solid at bottom256 < y <= top256. The ids say which composition shows at either end.
-struct SolidInterval {
-    std::int32_t bottom256 = 0;
-    std::int32_t top256 = 0;
-    std::uint16_t bottom_id = 0;
-    std::uint16_t top_id = 0;
+/// Stands for an end above all heights, with room to add and subtract any height.
+inline constexpr std::int32_t kEndlessly256 = 1 << 30;
 
-    friend bool operator==(const SolidInterval&, const SolidInterval&) = default;
+/// A height where a column changes between solid and not, and the composition that shows there.
+struct SolidEnd {
+    std::int32_t y256 = 0;
+    std::uint16_t palette_id = 0;
+
+    friend bool operator==(const SolidEnd&, const SolidEnd&) = default;
 };
 
-/// The intervals of all (N + 2) x (N + 2) columns of a stack, apron included, row by row (z slow,
-/// index 0 is column (-1, -1)). What most columns need, their topmost interval, is also in plain
-/// arrays.
+/// The ends of all (N + 2) x (N + 2) columns of a stack, apron included, row by row (z slow, index
+/// 0 is column (-1, -1)). A column's ends ascend strictly: the ground's top, then bottom and top of
+/// every further interval. A height is solid iff an even number of ends lies below it, so a top is
+/// solid and a bottom is not.
+///
+/// Plane i holds every column's end i, so that neighbouring columns are read together; there are as
+/// many planes as the column of most ends has ends, and what a column lacks is kEndlessly256. Their
+/// number is odd, and so is every column's own.
 struct SolidColumns {
-    std::size_t width = 0;                 ///< N + 2
-    std::vector<std::uint32_t> offsets;    ///< width * width + 1, into `intervals`
-    std::vector<SolidInterval> intervals;  ///< ascending in each column, never empty
-    std::vector<std::int32_t> top256;      ///< top of the highest interval
+    std::size_t width = 0;  ///< N + 2
+    std::size_t plane_count = 0;
+    std::vector<std::int32_t> planes256;   ///< plane_count x width x width
+    std::vector<std::uint16_t> plane_ids;  ///< what shows at each end
+    std::vector<std::int32_t> top256;      ///< the highest end of each column
     std::vector<std::uint16_t> top_id;     ///< what shows there
-    /// From this height up the nearest end within kDistanceMax256 can only be top256: the least
-    /// value for a column of one interval.
+    /// From this height up the nearest end within kDistanceMax256 can only be top256: far below
+    /// everything for a column of one end.
     std::vector<std::int32_t> simple_from256;
-    std::int32_t lowest256 = 0;   ///< the lowest end of all, the ground's bottom aside
+    std::int32_t lowest256 = 0;   ///< the lowest end of all
     std::int32_t highest256 = 0;  ///< the highest end of all
 
-    std::span<const SolidInterval> column(std::size_t index) const {
-        return std::span(intervals).subspan(offsets[index], offsets[index + 1] - offsets[index]);
+    std::size_t column_count() const { return width * width; }
+
+    const std::int32_t* plane256(std::size_t i) const {
+        return planes256.data() + i * column_count();
     }
+
+    /// End i of a column; {kEndlessly256} if it has fewer.
+    SolidEnd end(std::size_t column, std::size_t i) const {
+        const std::size_t at = i * column_count() + column;
+        return {.y256 = planes256[at], .palette_id = plane_ids[at]};
+    }
+
+    /// Scratch of find_solid_columns.
+    std::vector<std::uint32_t> not_layers;  ///< the limits that show no layer
+    std::vector<SolidEnd> many_ends;        ///< of the columns that have more than one, in order
+    std::vector<std::uint32_t> many;        ///< those columns, and how many ends each has
 };
 
 /// Overwrites `out`; allocates only while its buffers grow. Needs: columns of at least one limit.

@@ -32,19 +32,17 @@ constexpr std::int64_t kRangeVoxelsMax = std::int64_t{1} << 22;
 
 /// A corner of a cell: which of its columns, and whether at the ceiling.
 struct Corner {
-    std::size_t lane = 0;
+    int lane = 0;
     bool is_high = false;
 };
 
 /// The solid end of the first crossed level edge, in a fixed order. Needs: there is one.
 Corner solid_end_of_level_edge(const CellCorners& corners) {
-    constexpr std::array<std::pair<std::size_t, std::size_t>, 4> kEdges = {
-        {{0, 1}, {2, 3}, {0, 2}, {1, 3}}};
-    for (const bool is_high : {true, false}) {
-        const Lanes solid = is_high ? corners.solid_high : corners.solid_low;
+    constexpr std::array<std::pair<int, int>, 4> kEdges = {{{0, 1}, {2, 3}, {0, 2}, {1, 3}}};
+    for (const int level : {4, 0}) {
         for (const auto& [a, b] : kEdges) {
-            if (solid[a] != solid[b]) {
-                return {.lane = solid[a] != 0 ? a : b, .is_high = is_high};
+            if (corners.solid[level + a] != corners.solid[level + b]) {
+                return {.lane = corners.solid[level + a] != 0 ? a : b, .is_high = level != 0};
             }
         }
     }
@@ -60,66 +58,104 @@ struct SurfaceNetsMesher::Buffers {
     SolidMask solid;
     EdgeMasks edges;
     Cells cells;
+    std::vector<PackedPosition> packed;
 };
 
 namespace {
 
-struct SurfacePoint {
-    CellVertex vertex;
-    Shade shade;
+/// Where the set bits of a row of words are.
+class BitList {
+  public:
+    struct Place {
+        std::uint16_t x;
+        std::uint16_t bit;
+    };
+
+    /// Replaces the list by the bits of row[first] to row[last]. One place a word is written
+    /// whether there is one or not, so that what most words hold, no bit or one, takes no jump.
+    void read(const Word* row, std::size_t first, std::size_t last) {
+        Place* next = places_.data();
+        for (std::size_t x = first; x <= last; ++x) {
+            Word bits = row[x];
+            *next = place(x, bits);
+            next += bits != 0 ? 1 : 0;
+            for (bits &= bits - 1; bits != 0; bits &= bits - 1) {
+                *next++ = place(x, bits);
+            }
+        }
+        count_ = static_cast<std::size_t>(next - places_.data());
+    }
+
+    std::span<const Place> places() const { return std::span(places_).first(count_); }
+
+  private:
+    static Place place(std::size_t x, Word bits) {
+        return {.x = static_cast<std::uint16_t>(x),
+                .bit = static_cast<std::uint16_t>(std::countr_zero(bits))};
+    }
+
+    std::array<Place, (kChunkSideMax + 2) * 64 + 1> places_;
+    std::size_t count_ = 0;
 };
 
 /// Makes the vertices of one tile; only reads what it refers to.
 class VertexMaker {
   public:
+    struct Vertex {
+        CellVertex vertex;
+        Shade shade;
+    };
+
     VertexMaker(const Stack& stack, const SolidColumns& columns,
                 std::span<const PaletteShade> shades)
         : stack_(stack), columns_(columns), shades_(shades) {}
 
-    /// Turns to the cells over columns `index` (the least), its neighbours in x and z.
-    void enter(std::size_t index) {
-        const std::size_t width = columns_.width;
-        at_ = {index, index + 1, index + width, index + width + 1};
-        top256_ = lanes_of(columns_.top256);
-        const Lanes from = lanes_of(columns_.simple_from256);
-        simple_from256_ = std::max(std::max(from[0], from[1]), std::max(from[2], from[3]));
-    }
-
-    SurfacePoint at(std::int32_t floor256) const {
-        return floor256 >= simple_from256_ ? in_the_open(floor256) : near_caves(floor256);
+    /// The vertex of the cell over column `index`, its next in x, and those next in z.
+    Vertex at(std::size_t index, std::int32_t floor256) const {
+        const bool is_open =
+            bits_of(lanes_of(columns_.simple_from256.data(), index) > floor256) == 0;
+        const CellCorners corners =
+            is_open ? corners_of_one_end(lanes_of(columns_.top256.data(), index) - floor256)
+                    : corners_of_ends(columns_.plane_count, [&](std::size_t plane) {
+                          return lanes_of(columns_.plane256(plane), index) - floor256;
+                      });
+        const unsigned crossed = bits_of(crossed_upright(corners));
+        Vertex made{.vertex = cell_vertex(corners), .shade = {}};
+        if (crossed == 0) {
+            made.shade = of_cliff(corners, index, floor256);
+        } else {
+            const std::size_t first = column(index, std::countr_zero(crossed));
+            made.shade = shades_[is_open ? columns_.top_id[first] : end_id(first, floor256)].shade;
+        }
+        return made;
     }
 
   private:
-    Lanes lanes_of(const std::vector<std::int32_t>& values) const {
-        return Lanes{values[at_[0]], values[at_[1]], values[at_[2]], values[at_[3]]};
+    std::size_t column(std::size_t index, int lane) const {
+        const auto at = static_cast<std::size_t>(lane);
+        return index + (at & 1U) + (at >> 1U) * columns_.width;
     }
 
-    SurfacePoint in_the_open(std::int32_t floor256) const {
-        const CellCorners corners = corners_below_tops(top256_ - floor256);
-        const unsigned crossed = bits_of(corners.solid_low & ~corners.solid_high);
-        if (crossed == 0) {
-            return {.vertex = cell_vertex(corners), .shade = of_cliff(corners, floor256)};
+    Lanes lanes_of(const std::int32_t* values, std::size_t index) const {
+        const std::int32_t* const here = values + index;
+        const std::int32_t* const next_z = here + columns_.width;
+        return Lanes{here[0], here[1], next_z[0], next_z[1]};
+    }
+
+    /// What shows at a column's first end that is not below the floor.
+    std::uint16_t end_id(std::size_t column, std::int32_t floor256) const {
+        std::size_t i = 0;
+        while (columns_.end(column, i).y256 < floor256) {
+            ++i;
         }
-        const auto lane = static_cast<std::size_t>(std::countr_zero(crossed));
-        return {
-            .vertex = crossed == 0xF ? flat_cell_vertex(corners.crossing) : cell_vertex(corners),
-            .shade = shades_[columns_.top_id[at_[lane]]].shade};
+        return columns_.end(column, i).palette_id;
     }
 
-    SurfacePoint near_caves(std::int32_t floor256) const {
-        const CaveCell cell = cave_cell(columns_, at_, floor256);
-        const unsigned crossed = bits_of(cell.corners.solid_low ^ cell.corners.solid_high);
-        const auto lane = static_cast<std::size_t>(std::countr_zero(crossed));
-        return {.vertex = cell_vertex(cell.corners),
-                .shade = crossed == 0 ? of_cliff(cell.corners, floor256)
-                                      : shades_[cell.crossing_ids[lane]].shade};
-    }
-
-    Shade of_cliff(const CellCorners& corners, std::int32_t floor256) const {
+    Shade of_cliff(const CellCorners& corners, std::size_t index, std::int32_t floor256) const {
         const Corner end = solid_end_of_level_edge(corners);
         const ColumnGrid& grid = stack_.columns;
-        const std::uint32_t first = grid.offsets[at_[end.lane]];
-        const std::uint32_t last = grid.offsets[at_[end.lane] + 1];
+        const std::uint32_t first = grid.offsets[column(index, end.lane)];
+        const std::uint32_t last = grid.offsets[column(index, end.lane) + 1];
         return shade_at(std::span(grid.limits).subspan(first, last - first),
                         floor256 + (end.is_high ? kUnitsPerVoxel : 0), stack_.palette, shades_);
     }
@@ -127,72 +163,86 @@ class VertexMaker {
     const Stack& stack_;
     const SolidColumns& columns_;
     std::span<const PaletteShade> shades_;
-    std::array<std::size_t, 4> at_{};
-    Lanes top256_{};
-    std::int32_t simple_from256_ = 0;
 };
 
-/// One vertex for every used cell, in the order of their numbers.
-void find_vertices(Mesh& out, VertexMaker maker, const Cells& cells, const Window& window) {
+/// Where the cells of a row or of a slice stand along one axis: column i stands at i - 1 + 1/2, and
+/// cells that straddle a side give their vertex to that side.
+struct CellPlaces {
+    std::array<std::int32_t, kChunkSideMax + 1> base256;
+    std::array<std::int32_t, kChunkSideMax + 1> keeps;  ///< mask: the offset in the cell counts
+
+    explicit CellPlaces(std::size_t last) {
+        for (std::size_t i = 0; i <= last; ++i) {
+            const bool is_side = i == 0 || i == last;
+            base256[i] =
+                static_cast<std::int32_t>(i) * kUnitsPerVoxel - (is_side ? 0 : kUnitsPerVoxel / 2);
+            keeps[i] = is_side ? 0 : -1;
+        }
+    }
+};
+
+/// One vertex for every used cell, at its number; its position in `packed` too.
+void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexMaker& maker,
+                   const Cells& cells, const Window& window) {
     const std::size_t width = cells.used.width;
-    const std::size_t last = width - 2;  // the last cell of a row: it straddles the far side
-    const auto side256 = static_cast<std::int32_t>(last) * kUnitsPerVoxel;
-    const auto place = [last, side256](std::size_t cell, std::int32_t offset256) {
-        // Column i stands at i - 1 + 1/2. Cells that straddle a side give their vertex to that
-        // side.
-        const auto inside = static_cast<std::int32_t>(cell) * kUnitsPerVoxel - 128 + offset256;
-        return cell == 0 ? 0 : cell == last ? side256 : inside;
-    };
-    std::size_t next = 0;
+    const std::size_t last = width - 2;
+    const CellPlaces places(last);
+    BitList list;
     for (std::size_t z = 0; z <= last; ++z) {
-        for (std::size_t x = 0; x <= last; ++x) {
-            maker.enter(z * width + x);
-            for (std::size_t word = 0; word < cells.used.words; ++word) {
-                const std::int32_t word_y = static_cast<std::int32_t>(word) * 64;
-                for (Word bits = cells.used.row(z, word)[x]; bits != 0; bits &= bits - 1) {
-                    const std::int32_t bit = word_y + std::countr_zero(bits);
-                    const auto [vertex, shade] = maker.at((window.bit0_y + bit) * kUnitsPerVoxel);
-                    out.positions256[next] = {
-                        place(x, vertex.offset256.x),
-                        bit * kUnitsPerVoxel - window.origin256 + vertex.offset256.y,
-                        place(z, vertex.offset256.z)};
-                    out.normals[next] = vertex.normal;
-                    out.colors[next] = {shade.r, shade.g, shade.b};
-                    out.material_ids[next] = shade.material;
-                    ++next;
-                }
+        for (std::size_t word = 0; word < cells.used.words; ++word) {
+            list.read(cells.used.row(z, word), 0, last);
+            const std::int32_t word_y = static_cast<std::int32_t>(word) * 64;
+            const std::uint32_t* const first_vertex =
+                cells.first_vertex.data() + (cells.used.row(z, word) - cells.used.bits.data());
+            std::size_t x_before = width;
+            std::size_t at = 0;
+            for (const auto [x, bit] : list.places()) {
+                at = x == x_before ? at + 1 : first_vertex[x];
+                x_before = x;
+                const std::int32_t y = word_y + bit;
+                const auto [vertex, shade] =
+                    maker.at(z * width + x, (window.bit0_y + y) * kUnitsPerVoxel);
+                const Lanes base = {places.base256[x], y * kUnitsPerVoxel - window.origin256,
+                                    places.base256[z], 0};
+                const Lanes keeps = {places.keeps[x], -1, places.keeps[z], 0};
+                const Lanes position = base + (vertex.offset256 & keeps);
+                packed[at] = packed_position(position);
+                out.positions256[at] = {position[0], position[1], position[2]};
+                out.normals[at] = {vertex.normal[0], vertex.normal[1], vertex.normal[2]};
+                out.colors[at] = {shade.r, shade.g, shade.b};
+                out.material_ids[at] = shade.material;
             }
         }
     }
-    TERRANE_DEBUG_ASSERT(next == cells.vertex_count);
 }
 
 /// Writes two triangles a quad, split along the shorter diagonal.
 class QuadWriter {
   public:
-    QuadWriter(Mesh& out) : positions_(out.positions256.data()), next_(out.indices.data()) {}
+    QuadWriter(std::uint32_t* indices, const PackedPosition* positions)
+        : next_(indices), positions_(positions) {}
 
     /// a, b, c, d run counter-clockwise seen from the side that faces_forward says is outside.
     void write(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d,
                bool faces_forward) {
         const std::uint32_t second = faces_forward ? b : d;
         const std::uint32_t fourth = faces_forward ? d : b;
-        const bool splits_at_a = square(a, c) <= square(b, d);
-        const std::array<std::uint32_t, 6> triangles = {
-            a, second, splits_at_a ? c : fourth, splits_at_a ? a : second, c, fourth};
-        next_ = std::copy(triangles.begin(), triangles.end(), next_);
+        const bool splits_at_a =
+            is_first_shorter(positions_[a], positions_[c], positions_[b], positions_[d]);
+        next_[0] = a;
+        next_[1] = second;
+        next_[2] = splits_at_a ? c : fourth;
+        next_[3] = splits_at_a ? a : second;
+        next_[4] = c;
+        next_[5] = fourth;
+        next_ += 6;
     }
 
     const std::uint32_t* end() const { return next_; }
 
   private:
-    std::int32_t square(std::uint32_t a, std::uint32_t b) const {
-        const glm::i32vec3 d = positions_[a] - positions_[b];  // at most two voxels long each way
-        return d.x * d.x + d.y * d.y + d.z * d.z;
-    }
-
-    const glm::i32vec3* positions_;
     std::uint32_t* next_;
+    const PackedPosition* positions_;
 };
 
 /// The cells of one word of a row, to find vertices by.
@@ -210,39 +260,37 @@ struct CellRow {
     }
 };
 
-void find_triangles(Mesh& out, const SolidMask& solid, const EdgeMasks& edges, const Cells& cells) {
-    QuadWriter quads(out);
+void find_triangles(Mesh& out, const std::vector<PackedPosition>& packed, const SolidMask& solid,
+                    const EdgeMasks& edges, const Cells& cells) {
+    QuadWriter quads(out.indices.data(), packed.data());
+    BitList list;
     const std::size_t side = solid.width - 2;
     for (std::size_t z = 1; z <= side; ++z) {
         for (std::size_t word = 0; word < solid.words; ++word) {
             const CellRow before(cells, z - 1, word);
             const CellRow here(cells, z, word);
-            const Word* const is_solid = solid.row(z, word);
-            const Word* const upright = edges.upright.row(z, word);
-            const Word* const along_x = edges.along_x.row(z, word);
-            const Word* const along_z = edges.along_z.row(z, word);
-            for (std::size_t x = 1; x <= side; ++x) {
-                const auto faces_on = [inside = is_solid[x]](unsigned bit) {
-                    return ((inside >> bit) & 1U) != 0;
-                };
-                for (Word bits = upright[x]; bits != 0; bits &= bits - 1) {
-                    const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-                    quads.write(before.vertex(x - 1, bit), here.vertex(x - 1, bit),
-                                here.vertex(x, bit), before.vertex(x, bit), faces_on(bit));
-                }
-                // The cells under a level edge hold the vertices before those over it.
-                for (Word bits = along_x[x]; bits != 0; bits &= bits - 1) {
-                    const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-                    const std::uint32_t a = before.vertex(x, bit);
-                    const std::uint32_t b = here.vertex(x, bit);
-                    quads.write(a - 1, a, b, b - 1, faces_on(bit));
-                }
-                for (Word bits = along_z[x]; bits != 0; bits &= bits - 1) {
-                    const auto bit = static_cast<unsigned>(std::countr_zero(bits));
-                    const std::uint32_t a = here.vertex(x - 1, bit);
-                    const std::uint32_t b = here.vertex(x, bit);
-                    quads.write(a - 1, b - 1, b, a, faces_on(bit));
-                }
+            const auto starts_solid = [row = solid.row(z, word)](BitList::Place at) {
+                return ((row[at.x] >> at.bit) & 1U) != 0;
+            };
+            list.read(edges.upright.row(z, word), 1, side);
+            for (const BitList::Place at : list.places()) {
+                const std::size_t x_before = at.x - std::size_t{1};
+                quads.write(before.vertex(x_before, at.bit), here.vertex(x_before, at.bit),
+                            here.vertex(at.x, at.bit), before.vertex(at.x, at.bit),
+                            starts_solid(at));
+            }
+            // The cell under a level edge has the vertex before that of the cell over it.
+            list.read(edges.along_x.row(z, word), 1, side);
+            for (const BitList::Place at : list.places()) {
+                const std::uint32_t a = before.vertex(at.x, at.bit);
+                const std::uint32_t b = here.vertex(at.x, at.bit);
+                quads.write(a - 1, a, b, b - 1, starts_solid(at));
+            }
+            list.read(edges.along_z.row(z, word), 1, side);
+            for (const BitList::Place at : list.places()) {
+                const std::uint32_t a = here.vertex(at.x - std::size_t{1}, at.bit);
+                const std::uint32_t b = here.vertex(at.x, at.bit);
+                quads.write(a - 1, b - 1, b, a, starts_solid(at));
             }
         }
     }
@@ -286,8 +334,9 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     out.colors.resize(vertices);
     out.material_ids.resize(vertices);
     out.indices.resize(6 * count_edges(b.edges));
-    find_vertices(out, VertexMaker(stack, b.columns, b.shades), b.cells, window);
-    find_triangles(out, b.solid, b.edges, b.cells);
+    b.packed.resize(vertices);
+    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades), b.cells, window);
+    find_triangles(out, b.packed, b.solid, b.edges, b.cells);
 }
 
 }  // namespace terrane

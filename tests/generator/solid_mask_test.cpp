@@ -9,9 +9,17 @@
 namespace terrane {
 namespace {
 
-std::vector<SolidInterval> intervals_of(const SolidColumns& columns, std::size_t x) {
-    const auto span = columns.column(columns.width + x);
-    return {span.begin(), span.end()};
+std::vector<SolidEnd> ends_of(const SolidColumns& columns, std::size_t x) {
+    std::vector<SolidEnd> ends;
+    for (std::size_t i = 0; i < columns.plane_count; ++i) {
+        const SolidEnd end = columns.end(columns.width + x, i);
+        if (end.y256 != kEndlessly256) {
+            ends.push_back(end);
+        }
+    }
+    EXPECT_EQ(columns.top256[columns.width + x], ends.back().y256);
+    EXPECT_EQ(columns.top_id[columns.width + x], ends.back().palette_id);
+    return ends;
 }
 
 TEST(SolidMask, MergesMaterialsAndParts) {
@@ -29,13 +37,11 @@ TEST(SolidMask, MergesMaterialsAndParts) {
     const auto a = letters.id('a');
     const auto b = letters.id('b');
     const auto vein = letters.id('V');
-    using Intervals = std::vector<SolidInterval>;
-    EXPECT_EQ(intervals_of(columns, 0), (Intervals{{kGroundBottom256, 5 * 256, a, b}}));
-    EXPECT_EQ(intervals_of(columns, 1),
-              (Intervals{{kGroundBottom256, 256, a, a}, {4 * 256, 5 * 256, b, b}}));
-    EXPECT_EQ(intervals_of(columns, 2),
-              (Intervals{{kGroundBottom256, 2 * 256, a, a}, {3 * 256, 5 * 256, vein, b}}));
-    EXPECT_EQ(intervals_of(columns, 5), (Intervals{{kGroundBottom256, 2 * 256, a, vein}}));
+    using Ends = std::vector<SolidEnd>;
+    EXPECT_EQ(ends_of(columns, 0), (Ends{{5 * 256, b}}));
+    EXPECT_EQ(ends_of(columns, 1), (Ends{{256, a}, {4 * 256, b}, {5 * 256, b}}));
+    EXPECT_EQ(ends_of(columns, 2), (Ends{{2 * 256, a}, {3 * 256, vein}, {5 * 256, b}}));
+    EXPECT_EQ(ends_of(columns, 5), (Ends{{2 * 256, vein}}));
     EXPECT_EQ(columns.lowest256, 256);
     EXPECT_EQ(columns.highest256, 5 * 256);
 }
