@@ -4,6 +4,7 @@
 #include "generator/world/world_file.h"
 #include "protocol/wire/limits.h"
 #include "server/chunks/build_chunk.h"
+#include "server/chunks/store_identity.h"
 #include "storage/memory_store.h"
 #include "storage/rocksdb_store.h"
 
@@ -28,11 +29,7 @@ constexpr std::size_t kKeyInFlightBytes = 400;
 constexpr std::size_t kWaiterBytes = 200;
 
 Result<std::unique_ptr<ChunkStore>> open_store(const ServerOptions& options, const Log& log) {
-    const World& world = *options.world;
-    const StoreIdentity identity{.fingerprint = world.fingerprint,
-                                 .content_id = content_id_of(world),
-                                 .generator_version = kGeneratorVersion,
-                                 .world_name = world.definition.name};
+    const StoreIdentity identity = store_identity_of(*options.world);
     if (options.store == StoreKind::memory) {
         return std::make_unique<MemoryStore>(identity);
     }

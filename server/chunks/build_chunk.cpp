@@ -6,6 +6,7 @@
 #include "protocol/wire/column_payload.h"
 #include "protocol/wire/limits.h"
 #include "server/chunks/chunk_record.h"
+#include "server/chunks/store_identity.h"
 
 #include <algorithm>
 #include <chrono>
@@ -135,20 +136,14 @@ Result<ChunkBuilder::StackInHand> ChunkBuilder::stack_for(const Task& task, Stac
         generated_position_ = position;
         stack = std::make_shared<const Stack>(stack_);  // a copy: exactly as large as it must be
         encode_stack(bytes_, *stack);
-        write_record({.family = Family::stacks,
-                      .format = 0,
-                      .position = {.lod = position.lod, .x = position.x, .y = 0, .z = position.z}},
-                     bytes_);
+        write_record(stack_record_key(position), bytes_);
     }
     context_.stacks->put(position, stack, memory_bytes(*stack));
     return StackInHand{.stack = std::move(stack), .generated = generated};
 }
 
 std::shared_ptr<const Stack> ChunkBuilder::stored_stack(StackPos position) {
-    const RecordKey key{
-        .family = Family::stacks,
-        .format = 0,
-        .position = {.lod = position.lod, .x = position.x, .y = 0, .z = position.z}};
+    const RecordKey key = stack_record_key(position);
     const auto bytes = read_record(key);
     if (!bytes) {
         return nullptr;
