@@ -94,8 +94,19 @@ class Exceptions {
 class ExceptionReader {
   public:
     explicit ExceptionReader(ByteReader& in) : in_(in) {
-        left_ = in.varint();
+        const auto count = in.varint();
+        left_ = count.value_or(0);
+        ok_ = count.has_value();
         load();
+    }
+
+    /// Steps over so many cells if none of them is an exception.
+    bool skip(std::size_t cells) {
+        if (pending_ && until_ < cells) {
+            return false;
+        }
+        until_ -= cells;
+        return true;
     }
 
     /// The value that replaces the prediction of this cell, if any.
@@ -110,28 +121,29 @@ class ExceptionReader {
     }
 
     /// All read, and the bytes were not cut short.
-    bool finished() const { return left_ == std::uint64_t{0} && !pending_; }
+    bool finished() const { return ok_ && left_ == 0 && !pending_; }
 
   private:
     void load() {
         pending_ = false;
-        if (!left_ || *left_ == 0) {
+        if (!ok_ || left_ == 0) {
             return;
         }
         const auto until = in_.varint();
         const auto value = in_.varint();
         if (!until || !value) {
-            left_.reset();
+            ok_ = false;
             return;
         }
-        --*left_;
+        --left_;
         until_ = *until;
         value_ = *value;
         pending_ = true;
     }
 
     ByteReader& in_;
-    std::optional<std::uint64_t> left_;
+    std::uint64_t left_ = 0;
+    bool ok_ = false;
     bool pending_ = false;
     std::uint64_t until_ = 0;
     std::uint64_t value_ = 0;
@@ -219,8 +231,8 @@ void mark_plane(Plane& plane, std::span<const SlotCells> parts) {
     }
 }
 
-/// Calls visit(limit, slot) for every limit whose height is derived, in an order in which the
-/// limits it is derived from come first.
+/// Calls visit(first limit, stride, count, slot) for the limits of each run and slot whose heights
+/// are derived, in an order in which the limits they are derived from come first.
 template <typename Limits, typename Visit>
 void for_each_derived_height(const SignatureRuns& runs, const SlotRoles& roles, Limits limits,
                              Visit visit) {
@@ -229,13 +241,33 @@ void for_each_derived_height(const SignatureRuns& runs, const SlotRoles& roles, 
         const std::size_t slots = runs.table.offsets[run.signature + 1] - begin;
         for (std::size_t slot = 0; slot < slots; ++slot) {
             const HeightSlot& height = roles.heights[begin + slot];
-            if (height.role == HeightRole::plane) {
-                continue;
+            if (height.role != HeightRole::plane) {
+                visit(limits.data() + run.first_limit + slot, slots, run.length, height);
             }
-            auto* limit = limits.data() + run.first_limit + slot;
-            for (std::uint32_t i = 0; i < run.length; ++i, limit += slots) {
-                visit(limit, height);
-            }
+        }
+    }
+}
+
+std::uint32_t height_residual(const Limit* limit, const HeightSlot& slot) {
+    return bits_of(limit->y256) - bits_of(predicted_height(limit, slot));
+}
+
+void add_height_exceptions(Exceptions& exceptions, const Limit* limit, std::size_t stride,
+                           std::size_t count, const HeightSlot& slot) {
+    std::uint32_t any = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        any |= height_residual(limit + i * stride, slot);
+    }
+    if (any == 0) {
+        exceptions.agree(count);
+        return;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t residual = height_residual(limit + i * stride, slot);
+        if (residual == 0) {
+            exceptions.agree(1);
+        } else {
+            exceptions.add(zigzag(static_cast<std::int32_t>(residual)));
         }
     }
 }
@@ -250,15 +282,11 @@ void encode_heights_section(Bytes& out, const SignatureRuns& runs, const SlotRol
         encode_heights(out, plane);
     }
     Exceptions exceptions;
-    for_each_derived_height(runs, roles, limits, [&](const Limit* limit, const HeightSlot& slot) {
-        const std::uint32_t residual =
-            bits_of(limit->y256) - bits_of(predicted_height(limit, slot));
-        if (residual == 0) {
-            exceptions.agree(1);
-        } else {
-            exceptions.add(zigzag(static_cast<std::int32_t>(residual)));
-        }
-    });
+    for_each_derived_height(
+        runs, roles, limits,
+        [&](const Limit* limit, std::size_t stride, std::size_t count, const HeightSlot& slot) {
+            add_height_exceptions(exceptions, limit, stride, count, slot);
+        });
     exceptions.append_to(out);
 }
 
@@ -275,11 +303,16 @@ bool decode_heights_section(std::span<Limit> limits, ByteReader& in, const Signa
         });
     }
     ExceptionReader exceptions(in);
-    for_each_derived_height(runs, roles, limits, [&](Limit* limit, const HeightSlot& slot) {
-        const std::int64_t residual = unzigzag(exceptions.next().value_or(0));
-        limit->y256 = static_cast<std::int32_t>(bits_of(predicted_height(limit, slot)) +
-                                                static_cast<std::uint32_t>(residual));
-    });
+    for_each_derived_height(
+        runs, roles, limits,
+        [&](Limit* limit, std::size_t stride, std::size_t count, const HeightSlot& slot) {
+            const bool plain = exceptions.skip(count);
+            for (std::size_t i = 0; i < count; ++i, limit += stride) {
+                const std::int64_t residual = plain ? 0 : unzigzag(exceptions.next().value_or(0));
+                limit->y256 = static_cast<std::int32_t>(bits_of(predicted_height(limit, slot)) +
+                                                        static_cast<std::uint32_t>(residual));
+            }
+        });
     return exceptions.finished();
 }
 
@@ -348,28 +381,28 @@ PlaneCells flow_planes(const SignatureRuns& runs, std::span<const FlowRun> cut,
     return planes;
 }
 
-/// Calls visit(flow, predicted flow) for every limit whose flow is derived.
+/// Calls visit(first limit of the run, stride, count, slot, role) for each run and slot whose flow
+/// is derived.
 template <typename Limits, typename Visit>
 void for_each_derived_flow(const SignatureRuns& runs, std::span<const FlowRun> cut,
                            const SlotRoles& roles, Limits limits, Visit visit) {
     for_each_flow_slot(
         runs, cut, roles,
         [&](const SignatureRun& run, std::size_t slot, std::size_t slots, const FlowSlot& flow) {
-            if (flow.role == FlowRole::plane) {
-                return;
-            }
-            auto* first = limits.data() + run.first_limit;
-            for (std::uint32_t i = 0; i < run.length; ++i, first += slots) {
-                visit(first[slot].flow,
-                      flow.role == FlowRole::zero ? Flow{} : first[flow.source].flow);
+            if (flow.role != FlowRole::plane) {
+                visit(limits.data() + run.first_limit, slots, run.length, slot, flow);
             }
         });
 }
 
-std::uint64_t pack(Flow flow) {
-    return static_cast<std::uint64_t>(static_cast<std::uint8_t>(flow.x)) |
-           static_cast<std::uint64_t>(static_cast<std::uint8_t>(flow.y)) << 8U |
-           static_cast<std::uint64_t>(static_cast<std::uint8_t>(flow.z)) << 16U;
+Flow predicted_flow(const Limit* column, const FlowSlot& flow) {
+    return flow.role == FlowRole::zero ? Flow{} : column[flow.source].flow;
+}
+
+std::uint32_t pack(Flow flow) {
+    return static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.x)) |
+           static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.y)) << 8U |
+           static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.z)) << 16U;
 }
 
 Flow unpack(std::uint64_t bits) {
@@ -379,6 +412,27 @@ Flow unpack(std::uint64_t bits) {
 }
 
 constexpr std::int8_t Flow::* kFlowParts[] = {&Flow::x, &Flow::y, &Flow::z};
+
+void add_flow_exceptions(Exceptions& exceptions, const Limit* column, std::size_t stride,
+                         std::size_t count, std::size_t slot, const FlowSlot& role) {
+    std::uint32_t any = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Limit* at = column + i * stride;
+        any |= pack(at[slot].flow) ^ pack(predicted_flow(at, role));
+    }
+    if (any == 0) {
+        exceptions.agree(count);
+        return;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        const Limit* at = column + i * stride;
+        if (at[slot].flow == predicted_flow(at, role)) {
+            exceptions.agree(1);
+        } else {
+            exceptions.add(pack(at[slot].flow));
+        }
+    }
+}
 
 void encode_flow_section(Bytes& out, const SignatureRuns& runs, const SlotRoles& roles,
                          std::span<const Limit> limits, Plane& plane, const ColumnsLayout& layout) {
@@ -394,13 +448,11 @@ void encode_flow_section(Bytes& out, const SignatureRuns& runs, const SlotRoles&
         }
     }
     Exceptions exceptions;
-    for_each_derived_flow(runs, cut, roles, limits, [&](Flow flow, Flow predicted) {
-        if (flow == predicted) {
-            exceptions.agree(1);
-        } else {
-            exceptions.add(pack(flow));
-        }
-    });
+    for_each_derived_flow(runs, cut, roles, limits,
+                          [&](const Limit* column, std::size_t stride, std::size_t count,
+                              std::size_t slot, const FlowSlot& role) {
+                              add_flow_exceptions(exceptions, column, stride, count, slot, role);
+                          });
     exceptions.append_to(out);
 }
 
@@ -420,24 +472,32 @@ bool decode_flow_section(std::span<Limit> limits, ByteReader& in, const Signatur
         }
     }
     ExceptionReader exceptions(in);
-    for_each_derived_flow(runs, cut, roles, limits, [&](Flow& flow, Flow predicted) {
-        const auto other = exceptions.next();
-        flow = other ? unpack(*other) : predicted;
-    });
+    for_each_derived_flow(runs, cut, roles, limits,
+                          [&](Limit* column, std::size_t stride, std::size_t count,
+                              std::size_t slot, const FlowSlot& role) {
+                              const bool plain = exceptions.skip(count);
+                              for (std::size_t i = 0; i < count; ++i, column += stride) {
+                                  const auto other = plain ? std::nullopt : exceptions.next();
+                                  column[slot].flow =
+                                      other ? unpack(*other) : predicted_flow(column, role);
+                              }
+                          });
     return exceptions.finished();
 }
 
 void fill_columns(ColumnGrid& columns, const SignatureRuns& runs) {
-    columns.offsets.clear();
-    columns.limits.clear();
-    columns.offsets.push_back(0);
-    columns.limits.reserve(runs.limit_count);
+    columns.limits.resize(runs.limit_count);
+    columns.offsets.assign(1, 0);
+    Limit* next = columns.limits.data();
+    std::uint32_t offset = 0;
     for (const SignatureRun& run : runs.runs) {
+        const auto ids = runs.table[run.signature];
         for (std::uint32_t i = 0; i < run.length; ++i) {
-            for (const std::uint16_t id : runs.table[run.signature]) {
-                columns.limits.push_back({.y256 = 0, .palette_id = id, .flow = {}});
+            for (const std::uint16_t id : ids) {
+                *next++ = {.y256 = 0, .palette_id = id, .flow = {}};
             }
-            columns.offsets.push_back(static_cast<std::uint32_t>(columns.limits.size()));
+            offset += static_cast<std::uint32_t>(ids.size());
+            columns.offsets.push_back(offset);
         }
     }
 }

@@ -1,6 +1,9 @@
 #include "generator/volume/plane_coder.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
 #include <optional>
 
 namespace terrane {
@@ -92,19 +95,43 @@ std::uint32_t predict_edge(const Plane& plane, const CellSpan& span, std::uint32
     return has(1, bit + 1) ? up[1] : last;
 }
 
-std::uint32_t magnitude(std::uint32_t residual) {
-    return static_cast<std::int32_t>(residual) < 0 ? 0U - residual : residual;
+// The loops below work on a span at a time, through buffers that alias nothing, to be vectorised.
+using SpanBuffer = std::array<std::uint32_t, kPlaneSideMax>;
+
+void first_residuals(SpanBuffer& out, const std::uint32_t* cells, std::size_t length) {
+    for (std::size_t i = 0; i < length; ++i) {
+        out[i] = cells[i] - predict_first(cells + i);
+    }
+}
+
+void second_residuals(SpanBuffer& out, const std::uint32_t* cells, std::size_t length) {
+    for (std::size_t i = 0; i < length; ++i) {
+        out[i] = cells[i] - predict_second(cells + i);
+    }
+}
+
+/// Sum of the residuals' sizes, each taken as at most 2^24.
+std::uint32_t weight(const SpanBuffer& residuals, std::size_t length) {
+    std::uint32_t sum = 0;
+    for (std::size_t i = 0; i < length; ++i) {
+        const std::uint32_t size = std::min(residuals[i], 0U - residuals[i]);
+        sum += std::min(size, 1U << 24U);
+    }
+    return sum;
 }
 
 /// The order whose residuals are smaller where both apply.
 PlaneOrder better_order(const Plane& plane) {
     std::uint64_t first = 0;
     std::uint64_t second = 0;
+    SpanBuffer residuals;
     for_each_span(plane, PlaneOrder::second, [&](const CellSpan& span) {
-        const std::uint32_t* cells = plane.row(span.z) + span.x;
-        for (std::size_t i = 0; span.kind == SpanKind::second && i < span.length; ++i) {
-            first += magnitude(cells[i] - predict_first(cells + i));
-            second += magnitude(cells[i] - predict_second(cells + i));
+        if (span.kind == SpanKind::second) {
+            const std::uint32_t* cells = plane.row(span.z) + span.x;
+            first_residuals(residuals, cells, span.length);
+            first += weight(residuals, span.length);
+            second_residuals(residuals, cells, span.length);
+            second += weight(residuals, span.length);
         }
         return true;
     });
@@ -120,49 +147,78 @@ std::size_t cell_count(const Plane& plane) {
     return count;
 }
 
-/// Calls write(residual) for each present cell.
+/// Calls write(residuals, length) for each span.
 template <typename Write>
 void write_residuals(const Plane& plane, PlaneOrder order, Write write) {
     std::uint32_t last = 0;
+    SpanBuffer residuals;
     for_each_span(plane, order, [&](const CellSpan& span) {
         const std::uint32_t* cells = plane.row(span.z) + span.x;
         switch (span.kind) {
             case SpanKind::second:
-                for (std::size_t i = 0; i < span.length; ++i) {
-                    write(cells[i] - predict_second(cells + i));
-                }
+                second_residuals(residuals, cells, span.length);
                 break;
             case SpanKind::first:
-                for (std::size_t i = 0; i < span.length; ++i) {
-                    write(cells[i] - predict_first(cells + i));
-                }
+                first_residuals(residuals, cells, span.length);
                 break;
             case SpanKind::edge:
-                write(cells[0] - predict_edge(plane, span, last));
+                residuals[0] = cells[0] - predict_edge(plane, span, last);
                 break;
         }
+        write(residuals, span.length);
         last = cells[span.length - 1];
         return true;
     });
 }
 
-/// read(residual) gives false at the end of the bytes; `narrow` brings a sum back into range.
-template <typename Read, typename Narrow>
-bool read_residuals(Plane& plane, PlaneOrder order, Read read, Narrow narrow) {
+/// Adds the predictions that need no cell of this span to the residuals, then sums up.
+void add_first(std::uint32_t* cells, SpanBuffer& residuals, std::size_t length) {
+    for (std::size_t i = 0; i < length; ++i) {
+        residuals[i] += predict_first(cells + i) - cells[i - 1];
+    }
+    std::uint32_t left = cells[-1];
+    for (std::size_t i = 0; i < length; ++i) {
+        left += residuals[i];
+        cells[i] = left;
+    }
+}
+
+void add_second(std::uint32_t* cells, SpanBuffer& residuals, std::size_t length) {
+    for (std::size_t i = 0; i < length; ++i) {
+        residuals[i] += predict_second(cells + i) - 2 * cells[i - 1] + cells[i - 2];
+    }
+    std::uint32_t left = cells[-1];
+    std::uint32_t slope = left - cells[-2];
+    for (std::size_t i = 0; i < length; ++i) {
+        slope += residuals[i];
+        left += slope;
+        cells[i] = left;
+    }
+}
+
+/// read(residuals, length) gives false at the end of the bytes; `finish` is given each span of
+/// cells.
+template <typename Read, typename Finish>
+bool read_residuals(Plane& plane, PlaneOrder order, Read read, Finish finish) {
     std::uint32_t last = 0;
+    SpanBuffer residuals;
     return for_each_span(plane, order, [&](const CellSpan& span) {
         std::uint32_t* cells = plane.row(span.z) + span.x;
-        for (std::size_t i = 0; i < span.length; ++i) {
-            std::uint32_t residual = 0;
-            if (!read(residual)) {
-                return false;
-            }
-            const std::uint32_t predicted =
-                span.kind == SpanKind::second  ? predict_second(cells + i)
-                : span.kind == SpanKind::first ? predict_first(cells + i)
-                                               : predict_edge(plane, span, last);
-            cells[i] = narrow(predicted + residual);
+        if (!read(residuals, span.length)) {
+            return false;
         }
+        switch (span.kind) {
+            case SpanKind::second:
+                add_second(cells, residuals, span.length);
+                break;
+            case SpanKind::first:
+                add_first(cells, residuals, span.length);
+                break;
+            case SpanKind::edge:
+                cells[0] = predict_edge(plane, span, last) + residuals[0];
+                break;
+        }
+        finish(cells, span.length);
         last = cells[span.length - 1];
         return true;
     });
@@ -181,6 +237,57 @@ std::uint32_t narrow_to_byte(std::uint32_t value) {
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(static_cast<std::int8_t>(value)));
 }
 
+/// Small codes, the rule, are copied at once.
+std::byte* put_varints(std::byte* end, SpanBuffer& residuals, std::size_t length) {
+    std::uint32_t all = 0;
+    for (std::size_t i = 0; i < length; ++i) {
+        residuals[i] = zigzag32(residuals[i]);
+        all |= residuals[i];
+    }
+    if (all < 0x80U) {
+        std::array<std::byte, kPlaneSideMax> bytes;
+        for (std::size_t i = 0; i < length; ++i) {
+            bytes[i] = static_cast<std::byte>(residuals[i]);
+        }
+        std::memcpy(end, bytes.data(), length);
+        return end + length;
+    }
+    for (std::size_t i = 0; i < length; ++i) {
+        std::uint32_t code = residuals[i];
+        for (; code >= 0x80U; code >>= 7U) {
+            *end++ = static_cast<std::byte>(code | 0x80U);
+        }
+        *end++ = static_cast<std::byte>(code);
+    }
+    return end;
+}
+
+bool take_varints(SpanBuffer& residuals, std::size_t length, ByteReader& in) {
+    ByteReader ahead = in;
+    if (const auto bytes = ahead.take(length)) {
+        std::uint32_t all = 0;
+        for (std::size_t i = 0; i < length; ++i) {
+            residuals[i] = static_cast<std::uint32_t>((*bytes)[i]);
+            all |= residuals[i];
+        }
+        if (all < 0x80U) {
+            for (std::size_t i = 0; i < length; ++i) {
+                residuals[i] = unzigzag32(residuals[i]);
+            }
+            in = ahead;
+            return true;
+        }
+    }
+    for (std::size_t i = 0; i < length; ++i) {
+        const std::optional<std::uint64_t> code = in.varint();
+        if (!code || *code > 0xFFFFFFFFU) {
+            return false;
+        }
+        residuals[i] = unzigzag32(static_cast<std::uint32_t>(*code));
+    }
+    return true;
+}
+
 }  // namespace
 
 void encode_heights(Bytes& out, const Plane& plane) {
@@ -190,12 +297,8 @@ void encode_heights(Bytes& out, const Plane& plane) {
     out.resize(begin + 1 + kVarint32BytesMax * cell_count(plane));
     std::byte* end = out.data() + begin;
     *end++ = static_cast<std::byte>(order);
-    write_residuals(plane, order, [&](std::uint32_t residual) {
-        std::uint32_t code = zigzag32(residual);
-        for (; code >= 0x80U; code >>= 7U) {
-            *end++ = static_cast<std::byte>(code | 0x80U);
-        }
-        *end++ = static_cast<std::byte>(code);
+    write_residuals(plane, order, [&](SpanBuffer& residuals, std::size_t length) {
+        end = put_varints(end, residuals, length);
     });
     out.resize(static_cast<std::size_t>(end - out.data()));
 }
@@ -207,32 +310,41 @@ bool decode_heights(Plane& plane, ByteReader& in) {
     }
     return read_residuals(
         plane, static_cast<PlaneOrder>(*order),
-        [&](std::uint32_t& residual) {
-            const std::optional<std::uint64_t> code = in.varint();
-            residual = unzigzag32(static_cast<std::uint32_t>(code.value_or(0)));
-            return code && *code <= 0xFFFFFFFFU;
+        [&](SpanBuffer& residuals, std::size_t length) {
+            return take_varints(residuals, length, in);
         },
-        [](std::uint32_t value) { return value; });
+        [](std::uint32_t*, std::size_t) {});
 }
 
 void encode_bytes(Bytes& out, const Plane& plane) {
     const std::size_t begin = out.size();
     out.resize(begin + cell_count(plane));
     std::byte* end = out.data() + begin;
-    write_residuals(plane, PlaneOrder::first, [&](std::uint32_t residual) {
-        *end++ = static_cast<std::byte>(zigzag32(narrow_to_byte(residual)));
+    write_residuals(plane, PlaneOrder::first, [&](SpanBuffer& residuals, std::size_t length) {
+        std::array<std::byte, kPlaneSideMax> bytes;
+        for (std::size_t i = 0; i < length; ++i) {
+            bytes[i] = static_cast<std::byte>(zigzag32(narrow_to_byte(residuals[i])));
+        }
+        std::memcpy(end, bytes.data(), length);
+        end += length;
     });
 }
 
 bool decode_bytes(Plane& plane, ByteReader& in) {
     return read_residuals(
         plane, PlaneOrder::first,
-        [&](std::uint32_t& residual) {
-            const auto code = in.fixed<std::uint8_t>();
-            residual = unzigzag32(code.value_or(0));
-            return code.has_value();
+        [&](SpanBuffer& residuals, std::size_t length) {
+            const auto bytes = in.take(length);
+            for (std::size_t i = 0; bytes && i < length; ++i) {
+                residuals[i] = unzigzag32(static_cast<std::uint32_t>((*bytes)[i]));
+            }
+            return bytes.has_value();
         },
-        narrow_to_byte);
+        [](std::uint32_t* cells, std::size_t length) {
+            for (std::size_t i = 0; i < length; ++i) {
+                cells[i] = narrow_to_byte(cells[i]);
+            }
+        });
 }
 
 }  // namespace terrane
