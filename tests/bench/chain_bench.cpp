@@ -1,0 +1,148 @@
+// A cold mesh, whole and stage by stage, against Draco's encoding alone; and two workers against
+// one.
+#include "generator/mesh/draco_codec.h"
+#include "generator/mesh/surface_nets.h"
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
+#include "tests/bench/bench_world.h"
+#include "tests/bench/ratios.h"
+
+#include <benchmark/benchmark.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace terrane::bench {
+namespace {
+
+constexpr const char* kWorld = "basin";
+
+/// What a worker has, and one stack after another, so that no cache holds the answer.
+struct Chain {
+    std::shared_ptr<const World> world = bench_world(kWorld);
+    StackGenerator generator{*world};
+    SurfaceNetsMesher mesher{world->definition};
+    HeightRange heights{.first = 0,
+                        .last = static_cast<std::int64_t>(world->stack.height_bound) + 2};
+    DracoSettings settings{.side = world->definition.grid.side,
+                           .height_voxels = static_cast<std::int32_t>(heights.last) + 1};
+    Stack stack;
+    Mesh mesh;
+
+    bool generate(std::int64_t i) {
+        const StackPos position{.lod = 0,
+                                .x = static_cast<std::int32_t>(i % 1024) - 512,
+                                .z = static_cast<std::int32_t>(i / 1024 % 1024)};
+        return generator.generate(stack, position).has_value();
+    }
+
+    void make_mesh() { mesher.mesh(mesh, stack, heights); }
+
+    std::size_t encode() const {
+        const auto bytes = encode_draco(mesh, settings);
+        return bytes ? bytes->size() : 0;
+    }
+};
+
+void cold_generate(benchmark::State& state) {
+    Chain chain;
+    std::int64_t i = 0;
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(chain.generate(i++));
+    }
+}
+
+/// A few stacks, made beforehand.
+struct Prepared {
+    Chain chain;
+    std::vector<Stack> stacks = std::vector<Stack>(16);
+    std::vector<Mesh> meshes = std::vector<Mesh>(16);
+
+    Prepared() {
+        for (std::size_t i = 0; i < stacks.size(); ++i) {
+            chain.generate(static_cast<std::int64_t>(i) * 17);
+            stacks[i] = chain.stack;
+            chain.make_mesh();
+            meshes[i] = chain.mesh;
+        }
+    }
+};
+
+void cold_mesh(benchmark::State& state) {
+    Prepared prepared;
+    std::size_t i = 0;
+    std::size_t triangles = 0;
+    for (auto _ : state) {
+        prepared.chain.mesher.mesh(prepared.chain.mesh, prepared.stacks[i++ % 16],
+                                   prepared.chain.heights);
+        triangles += prepared.chain.mesh.triangle_count();
+    }
+    state.counters["triangles"] =
+        static_cast<double>(triangles) / static_cast<double>(state.iterations());
+}
+
+void cold_encode(benchmark::State& state) {
+    Prepared prepared;
+    std::size_t i = 0;
+    for (auto _ : state) {
+        const auto bytes = encode_draco(prepared.meshes[i++ % 16], prepared.chain.settings);
+        benchmark::DoNotOptimize(bytes->data());
+    }
+}
+
+void cold_whole(benchmark::State& state) {
+    Chain chain;
+    std::int64_t i = 0;
+    for (auto _ : state) {
+        chain.generate(i++);
+        chain.make_mesh();
+        benchmark::DoNotOptimize(chain.encode());
+    }
+}
+
+/// `workers` threads, each with a chain of its own, share 64 stacks.
+void workers_whole(benchmark::State& state) {
+    const auto workers = static_cast<std::int64_t>(state.range(0));
+    constexpr std::int64_t kStacks = 64;
+    std::vector<Chain> chains(static_cast<std::size_t>(workers));
+    std::int64_t round = 0;
+    for (auto _ : state) {
+        std::vector<std::jthread> threads;
+        for (std::int64_t w = 0; w < workers; ++w) {
+            threads.emplace_back([&chain = chains[static_cast<std::size_t>(w)], w, workers, round] {
+                for (std::int64_t i = w; i < kStacks; i += workers) {
+                    chain.generate(round * kStacks + i);
+                    chain.make_mesh();
+                    benchmark::DoNotOptimize(chain.encode());
+                }
+            });
+        }
+        threads.clear();
+        ++round;
+    }
+}
+
+BENCHMARK(cold_generate)->Unit(benchmark::kMicrosecond);
+BENCHMARK(cold_mesh)->Unit(benchmark::kMicrosecond);
+BENCHMARK(cold_encode)->Unit(benchmark::kMicrosecond);
+BENCHMARK(cold_whole)->Unit(benchmark::kMicrosecond);
+BENCHMARK(workers_whole)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+const RatioEntry kWhole{{.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone",
+                         .numerators = {"cold_whole"},
+                         .denominator = "cold_encode",
+                         .bar = 1.4}};
+const RatioEntry kMesh{{.what = "mesh / its Draco encode",
+                        .numerators = {"cold_mesh"},
+                        .denominator = "cold_encode",
+                        .bar = 0.08}};
+const RatioEntry kWorkers{{.what = "two workers / one worker, time for 64 cold meshes",
+                           .numerators = {"workers_whole/2"},
+                           .denominator = "workers_whole/1",
+                           .bar = 1 / 1.85}};
+
+}  // namespace
+}  // namespace terrane::bench
