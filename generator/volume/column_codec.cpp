@@ -1,9 +1,12 @@
 #include "generator/volume/column_codec.h"
 
+#include "generator/volume/exceptions.h"
 #include "generator/volume/plane_coder.h"
 #include "generator/volume/signatures.h"
+#include "generator/volume/slot_values.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -15,28 +18,13 @@ namespace {
 
 constexpr std::int32_t kBlendMost = 256;
 
-std::uint32_t bits_of(std::int32_t value) {
-    return static_cast<std::uint32_t>(value);
-}
-
-/// One slot of one run: limits first, first + stride, ... `count` of them.
+/// One slot of one run, or a part of it: `values` has `count` of them.
 struct SlotCells {
+    std::uint32_t* values = nullptr;
     std::uint32_t z = 0;
     std::uint32_t x = 0;
-    std::uint32_t first = 0;
-    std::uint32_t stride = 0;
     std::uint32_t count = 0;
-    std::uint32_t slot = 0;
 };
-
-SlotCells cells_of(const SignatureRun& run, std::size_t slot, std::size_t stride) {
-    return {.z = run.z,
-            .x = run.x,
-            .first = run.first_limit + static_cast<std::uint32_t>(slot),
-            .stride = static_cast<std::uint32_t>(stride),
-            .count = run.length,
-            .slot = static_cast<std::uint32_t>(slot)};
-}
 
 /// Cells sorted by the plane they belong to.
 class PlaneCells {
@@ -67,103 +55,31 @@ class PlaneCells {
     std::vector<SlotCells> cells_;
 };
 
-/// What was predicted otherwise than it is: (cells since the last one, value) pairs.
-class Exceptions {
-  public:
-    void agree(std::size_t cells) { since_ += cells; }
-
-    void add(std::uint64_t value) {
-        ++count_;
-        ByteWriter(bytes_).varint(since_);
-        ByteWriter(bytes_).varint(value);
-        since_ = 0;
-    }
-
-    void append_to(Bytes& out) const {
-        ByteWriter(out).varint(count_);
-        ByteWriter(out).raw(bytes_);
-    }
-
-  private:
-    Bytes bytes_;
-    std::size_t count_ = 0;
-    std::size_t since_ = 0;
-};
-
-/// Reads them back while the cells are walked in the same order.
-class ExceptionReader {
-  public:
-    explicit ExceptionReader(ByteReader& in) : in_(in) {
-        const auto count = in.varint();
-        left_ = count.value_or(0);
-        ok_ = count.has_value();
-        load();
-    }
-
-    /// Steps over so many cells if none of them is an exception.
-    bool skip(std::size_t cells) {
-        if (pending_ && until_ < cells) {
-            return false;
-        }
-        until_ -= cells;
-        return true;
-    }
-
-    /// The value that replaces the prediction of this cell, if any.
-    std::optional<std::uint64_t> next() {
-        if (!pending_ || until_ != 0) {
-            --until_;
-            return std::nullopt;
-        }
-        const std::uint64_t value = value_;
-        load();
-        return value;
-    }
-
-    /// All read, and the bytes were not cut short.
-    bool finished() const { return ok_ && left_ == 0 && !pending_; }
-
-  private:
-    void load() {
-        pending_ = false;
-        if (!ok_ || left_ == 0) {
-            return;
-        }
-        const auto until = in_.varint();
-        const auto value = in_.varint();
-        if (!until || !value) {
-            ok_ = false;
-            return;
-        }
-        --left_;
-        until_ = *until;
-        value_ = *value;
-        pending_ = true;
-    }
-
-    ByteReader& in_;
-    std::uint64_t left_ = 0;
-    bool ok_ = false;
-    bool pending_ = false;
-    std::uint64_t until_ = 0;
-    std::uint64_t value_ = 0;
-};
-
 /// The paper's 4.3: a layer blends over its own local thickness times its blend value.
-std::int32_t blended(std::int32_t bottom, std::int32_t top, std::int32_t blend) {
+std::uint32_t blended(std::uint32_t bottom_bits, std::uint32_t top_bits, std::int32_t blend) {
+    const auto bottom = static_cast<std::int32_t>(bottom_bits);
+    const auto top = static_cast<std::int32_t>(top_bits);
     const std::int64_t thickness = std::int64_t{top} - bottom;
     const std::int64_t end = bottom + std::max<std::int64_t>(1, (thickness * blend + 128) >> 8);
-    return static_cast<std::int32_t>(std::min<std::int64_t>(end, top));
+    return static_cast<std::uint32_t>(std::min<std::int64_t>(end, top));
 }
 
-std::int32_t predicted_height(const Limit* limit, const HeightSlot& slot) {
-    return slot.role == HeightRole::floor ? limit[-1].y256
-                                          : blended(limit[-1].y256, limit[1].y256, slot.blend);
+/// `at` is a height of a slot that is derived, those of the slots beside it lie `length` away.
+std::uint32_t predicted_height(const std::uint32_t* at, std::size_t length,
+                               const HeightSlot& slot) {
+    const std::uint32_t bottom = *(at - length);
+    return slot.role == HeightRole::floor ? bottom : blended(bottom, at[length], slot.blend);
+}
+
+/// The least B with (thickness * B + 128) >> 8 >= end, within 0..256.
+std::int32_t fitting_blend(std::int64_t thickness, std::int64_t end) {
+    const std::int64_t blend = (256 * end - 128 + thickness - 1) / thickness;
+    return static_cast<std::int32_t>(std::clamp<std::int64_t>(blend, 0, kBlendMost));
 }
 
 /// The blend of each palette entry, found from the thickest interval that shows it; 0 if none does.
 std::vector<std::int32_t> fit_blends(const SignatureRuns& runs, const Palette& palette,
-                                     std::span<const Limit> limits) {
+                                     SlotValues& values) {
     constexpr std::int64_t kThickEnough = 1024;  // then there is only one blend that fits
     std::vector<std::int32_t> blends(palette.size(), 0);
     std::vector<std::int64_t> thickest(palette.size(), 0);
@@ -175,16 +91,15 @@ std::vector<std::int32_t> fit_blends(const SignatureRuns& runs, const Palette& p
                 !may_blend(palette[ids[slot - 1]], palette[id])) {
                 continue;
             }
+            const std::uint32_t* middle = values.heights(run, slot);
             for (std::uint32_t i = 0; i < run.length; ++i) {
-                const Limit* limit = &limits[run.first_limit + i * ids.size() + slot];
-                const std::int64_t thickness = std::int64_t{limit[1].y256} - limit[-1].y256;
-                const std::int64_t end = std::int64_t{limit[0].y256} - limit[-1].y256;
+                const std::int64_t bottom = static_cast<std::int32_t>(*(middle + i - run.length));
+                const std::int64_t thickness =
+                    static_cast<std::int32_t>(middle[i + run.length]) - bottom;
                 if (thickness > thickest[id]) {
                     thickest[id] = thickness;
-                    // The least B with (thickness * B + 128) >> 8 >= end.
-                    const std::int64_t blend = (256 * end - 128 + thickness - 1) / thickness;
                     blends[id] =
-                        static_cast<std::int32_t>(std::clamp<std::int64_t>(blend, 0, kBlendMost));
+                        fitting_blend(thickness, static_cast<std::int32_t>(middle[i]) - bottom);
                 }
             }
         }
@@ -192,36 +107,27 @@ std::vector<std::int32_t> fit_blends(const SignatureRuns& runs, const Palette& p
     return blends;
 }
 
-PlaneCells height_planes(const SignatureRuns& runs, const SlotRoles& roles) {
+PlaneCells height_planes(const SignatureRuns& runs, const SlotRoles& roles, SlotValues& values) {
     PlaneCells planes(roles.height_plane_count);
     const auto for_each = [&](auto visit) {
         for (const SignatureRun& run : runs.runs) {
             const std::size_t begin = runs.table.offsets[run.signature];
-            const std::size_t slots = runs.table.offsets[run.signature + 1] - begin;
-            for (std::size_t slot = 0; slot < slots; ++slot) {
+            for (std::size_t slot = 0; slot < runs.table.slots(run.signature); ++slot) {
                 const HeightSlot& height = roles.heights[begin + slot];
                 if (height.role == HeightRole::plane) {
-                    visit(height.plane, run, slot, slots);
+                    visit(height.plane, run, slot);
                 }
             }
         }
     };
     for_each([&](std::uint32_t plane, const auto&...) { planes.count(plane); });
     planes.counted();
-    for_each([&](std::uint32_t plane, const SignatureRun& run, std::size_t slot,
-                 std::size_t slots) { planes.add(plane, cells_of(run, slot, slots)); });
+    for_each([&](std::uint32_t plane, const SignatureRun& run, std::size_t slot) {
+        planes.add(
+            plane,
+            {.values = values.heights(run, slot), .z = run.z, .x = run.x, .count = run.length});
+    });
     return planes;
-}
-
-/// Marks the plane's cells and gives `get` or `set` each cell with its limit.
-template <typename Limits, typename Visit>
-void visit_plane(Plane& plane, std::span<const SlotCells> parts, Limits limits, Visit visit) {
-    for (const SlotCells& part : parts) {
-        std::uint32_t* cells = plane.row(part.z) + part.x;
-        for (std::uint32_t i = 0; i < part.count; ++i) {
-            visit(cells[i], limits[part.first + std::size_t{i} * part.stride]);
-        }
-    }
 }
 
 void mark_plane(Plane& plane, std::span<const SlotCells> parts) {
@@ -231,39 +137,34 @@ void mark_plane(Plane& plane, std::span<const SlotCells> parts) {
     }
 }
 
-/// Calls visit(first limit, stride, count, slot) for the limits of each run and slot whose heights
-/// are derived, in an order in which the limits they are derived from come first.
-template <typename Limits, typename Visit>
-void for_each_derived_height(const SignatureRuns& runs, const SlotRoles& roles, Limits limits,
+/// Calls visit(heights, run length, slot) for each run and slot whose heights are derived, in an
+/// order in which those they are derived from come first.
+template <typename Visit>
+void for_each_derived_height(const SignatureRuns& runs, const SlotRoles& roles, SlotValues& values,
                              Visit visit) {
     for (const SignatureRun& run : runs.runs) {
         const std::size_t begin = runs.table.offsets[run.signature];
-        const std::size_t slots = runs.table.offsets[run.signature + 1] - begin;
-        for (std::size_t slot = 0; slot < slots; ++slot) {
+        for (std::size_t slot = 0; slot < runs.table.slots(run.signature); ++slot) {
             const HeightSlot& height = roles.heights[begin + slot];
             if (height.role != HeightRole::plane) {
-                visit(limits.data() + run.first_limit + slot, slots, run.length, height);
+                visit(values.heights(run, slot), run.length, height);
             }
         }
     }
 }
 
-std::uint32_t height_residual(const Limit* limit, const HeightSlot& slot) {
-    return bits_of(limit->y256) - bits_of(predicted_height(limit, slot));
-}
-
-void add_height_exceptions(Exceptions& exceptions, const Limit* limit, std::size_t stride,
-                           std::size_t count, const HeightSlot& slot) {
+void add_height_exceptions(Exceptions& exceptions, const std::uint32_t* heights, std::size_t length,
+                           const HeightSlot& slot) {
     std::uint32_t any = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        any |= height_residual(limit + i * stride, slot);
+    for (std::size_t i = 0; i < length; ++i) {
+        any |= heights[i] ^ predicted_height(heights + i, length, slot);
     }
     if (any == 0) {
-        exceptions.agree(count);
+        exceptions.agree(length);
         return;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::uint32_t residual = height_residual(limit + i * stride, slot);
+    for (std::size_t i = 0; i < length; ++i) {
+        const std::uint32_t residual = heights[i] - predicted_height(heights + i, length, slot);
         if (residual == 0) {
             exceptions.agree(1);
         } else {
@@ -272,53 +173,56 @@ void add_height_exceptions(Exceptions& exceptions, const Limit* limit, std::size
     }
 }
 
-void encode_heights_section(Bytes& out, const SignatureRuns& runs, const SlotRoles& roles,
-                            std::span<const Limit> limits, Plane& plane) {
-    const PlaneCells planes = height_planes(runs, roles);
+void encode_heights_section(Bytes& out, SlotValues& values, const SignatureRuns& runs,
+                            const SlotRoles& roles, Plane& plane) {
+    const PlaneCells planes = height_planes(runs, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
-        visit_plane(plane, planes[i], limits,
-                    [](std::uint32_t& cell, const Limit& limit) { cell = bits_of(limit.y256); });
+        for (const SlotCells& part : planes[i]) {
+            std::copy_n(part.values, part.count, plane.row(part.z) + part.x);
+        }
         encode_heights(out, plane);
     }
     Exceptions exceptions;
     for_each_derived_height(
-        runs, roles, limits,
-        [&](const Limit* limit, std::size_t stride, std::size_t count, const HeightSlot& slot) {
-            add_height_exceptions(exceptions, limit, stride, count, slot);
+        runs, roles, values,
+        [&](const std::uint32_t* heights, std::size_t length, const HeightSlot& slot) {
+            add_height_exceptions(exceptions, heights, length, slot);
         });
     exceptions.append_to(out);
 }
 
-bool decode_heights_section(std::span<Limit> limits, ByteReader& in, const SignatureRuns& runs,
+bool decode_heights_section(SlotValues& values, ByteReader& in, const SignatureRuns& runs,
                             const SlotRoles& roles, Plane& plane) {
-    const PlaneCells planes = height_planes(runs, roles);
+    const PlaneCells planes = height_planes(runs, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
         if (!decode_heights(plane, in)) {
             return false;
         }
-        visit_plane(plane, planes[i], limits, [](std::uint32_t cell, Limit& limit) {
-            limit.y256 = static_cast<std::int32_t>(cell);
-        });
+        for (const SlotCells& part : planes[i]) {
+            std::copy_n(plane.row(part.z) + part.x, part.count, part.values);
+        }
     }
     ExceptionReader exceptions(in);
     for_each_derived_height(
-        runs, roles, limits,
-        [&](Limit* limit, std::size_t stride, std::size_t count, const HeightSlot& slot) {
-            const bool plain = exceptions.skip(count);
-            for (std::size_t i = 0; i < count; ++i, limit += stride) {
+        runs, roles, values,
+        [&](std::uint32_t* heights, std::size_t length, const HeightSlot& slot) {
+            const bool plain = exceptions.skip(length);
+            for (std::size_t i = 0; i < length; ++i) {
                 const std::int64_t residual = plain ? 0 : unzigzag(exceptions.next().value_or(0));
-                limit->y256 = static_cast<std::int32_t>(bits_of(predicted_height(limit, slot)) +
-                                                        static_cast<std::uint32_t>(residual));
+                heights[i] = predicted_height(heights + i, length, slot) +
+                             static_cast<std::uint32_t>(residual);
             }
         });
     return exceptions.finished();
 }
 
-/// The runs cut at the apron's inner border, so that a run is inside or outside of it as a whole.
+/// A run, or the part of it that lies on one side of the apron's inner border.
 struct FlowRun {
-    SignatureRun run;
+    const SignatureRun* run = nullptr;
+    std::uint32_t x = 0;
+    std::uint32_t length = 0;
     bool inside = false;
 };
 
@@ -329,18 +233,16 @@ std::vector<FlowRun> flow_runs(const SignatureRuns& runs, const ColumnsLayout& l
     std::vector<FlowRun> cut;
     cut.reserve(runs.runs.size() + 2 * static_cast<std::size_t>(layout.length));
     for (const SignatureRun& run : runs.runs) {
-        const auto slots = static_cast<std::uint32_t>(runs.table[run.signature].size());
         const bool row_inside = run.z >= apron && run.z < z_end;
         std::uint32_t x = run.x;
         const std::uint32_t end = run.x + run.length;
         for (const std::uint32_t border : {row_inside ? apron : 0, row_inside ? x_end : 0, end}) {
             const std::uint32_t to = std::min(border, end);
             if (to > x) {
-                SignatureRun part = run;
-                part.first_limit += (x - run.x) * slots;
-                part.x = x;
-                part.length = to - x;
-                cut.push_back({.run = part, .inside = row_inside && x >= apron && x < x_end});
+                cut.push_back({.run = &run,
+                               .x = x,
+                               .length = to - x,
+                               .inside = row_inside && x >= apron && x < x_end});
                 x = to;
             }
         }
@@ -348,158 +250,133 @@ std::vector<FlowRun> flow_runs(const SignatureRuns& runs, const ColumnsLayout& l
     return cut;
 }
 
-/// Calls visit(run, slot, slots, role) for each slot of each run.
+/// Calls visit(part of a run, slot, role) for each slot of each part.
 template <typename Visit>
 void for_each_flow_slot(const SignatureRuns& runs, std::span<const FlowRun> cut,
                         const SlotRoles& roles, Visit visit) {
     for (const FlowRun& part : cut) {
-        const std::size_t begin = runs.table.offsets[part.run.signature];
-        const std::size_t slots = runs.table.offsets[part.run.signature + 1] - begin;
-        for (std::size_t slot = 0; slot < slots; ++slot) {
-            visit(part.run, slot, slots, part.inside ? roles.flows[begin + slot] : FlowSlot{});
+        const std::size_t begin = runs.table.offsets[part.run->signature];
+        for (std::size_t slot = 0; slot < runs.table.slots(part.run->signature); ++slot) {
+            visit(part, slot, part.inside ? roles.flows[begin + slot] : FlowSlot{});
         }
     }
 }
 
+std::uint32_t* flows_of(SlotValues& values, const FlowRun& part, std::size_t slot) {
+    return values.flows(*part.run, slot) + (part.x - part.run->x);
+}
+
 PlaneCells flow_planes(const SignatureRuns& runs, std::span<const FlowRun> cut,
-                       const SlotRoles& roles) {
+                       const SlotRoles& roles, SlotValues& values) {
     PlaneCells planes(roles.flow_plane_count);
+    for_each_flow_slot(runs, cut, roles, [&](const FlowRun&, std::size_t, const FlowSlot& flow) {
+        if (flow.role == FlowRole::plane) {
+            planes.count(flow.source);
+        }
+    });
+    planes.counted();
     for_each_flow_slot(runs, cut, roles,
-                       [&](const SignatureRun&, std::size_t, std::size_t, const FlowSlot& flow) {
+                       [&](const FlowRun& part, std::size_t slot, const FlowSlot& flow) {
                            if (flow.role == FlowRole::plane) {
-                               planes.count(flow.source);
+                               planes.add(flow.source, {.values = flows_of(values, part, slot),
+                                                        .z = part.run->z,
+                                                        .x = part.x,
+                                                        .count = part.length});
                            }
                        });
-    planes.counted();
-    for_each_flow_slot(
-        runs, cut, roles,
-        [&](const SignatureRun& run, std::size_t slot, std::size_t slots, const FlowSlot& flow) {
-            if (flow.role == FlowRole::plane) {
-                planes.add(flow.source, cells_of(run, slot, slots));
-            }
-        });
     return planes;
 }
 
-/// Calls visit(first limit of the run, stride, count, slot, role) for each run and slot whose flow
+/// Calls visit(flows, the flows they are predicted to be, count) for each part and slot whose flow
 /// is derived.
-template <typename Limits, typename Visit>
+template <typename Visit>
 void for_each_derived_flow(const SignatureRuns& runs, std::span<const FlowRun> cut,
-                           const SlotRoles& roles, Limits limits, Visit visit) {
+                           const SlotRoles& roles, SlotValues& values, Visit visit) {
+    static constexpr std::array<std::uint32_t, kPlaneSideMax> kZero{};
     for_each_flow_slot(
-        runs, cut, roles,
-        [&](const SignatureRun& run, std::size_t slot, std::size_t slots, const FlowSlot& flow) {
+        runs, cut, roles, [&](const FlowRun& part, std::size_t slot, const FlowSlot& flow) {
             if (flow.role != FlowRole::plane) {
-                visit(limits.data() + run.first_limit, slots, run.length, slot, flow);
+                visit(flows_of(values, part, slot),
+                      flow.role == FlowRole::zero ? kZero.data()
+                                                  : flows_of(values, part, flow.source),
+                      part.length);
             }
         });
 }
 
-Flow predicted_flow(const Limit* column, const FlowSlot& flow) {
-    return flow.role == FlowRole::zero ? Flow{} : column[flow.source].flow;
-}
-
-std::uint32_t pack(Flow flow) {
-    return static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.x)) |
-           static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.y)) << 8U |
-           static_cast<std::uint32_t>(static_cast<std::uint8_t>(flow.z)) << 16U;
-}
-
-Flow unpack(std::uint64_t bits) {
-    return {.x = static_cast<std::int8_t>(bits),
-            .y = static_cast<std::int8_t>(bits >> 8U),
-            .z = static_cast<std::int8_t>(bits >> 16U)};
-}
-
-constexpr std::int8_t Flow::* kFlowParts[] = {&Flow::x, &Flow::y, &Flow::z};
-
-void add_flow_exceptions(Exceptions& exceptions, const Limit* column, std::size_t stride,
-                         std::size_t count, std::size_t slot, const FlowSlot& role) {
-    std::uint32_t any = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        const Limit* at = column + i * stride;
-        any |= pack(at[slot].flow) ^ pack(predicted_flow(at, role));
-    }
-    if (any == 0) {
+void add_flow_exceptions(Exceptions& exceptions, const std::uint32_t* flows,
+                         const std::uint32_t* predicted, std::size_t count) {
+    if (std::equal(flows, flows + count, predicted)) {
         exceptions.agree(count);
         return;
     }
     for (std::size_t i = 0; i < count; ++i) {
-        const Limit* at = column + i * stride;
-        if (at[slot].flow == predicted_flow(at, role)) {
+        if (flows[i] == predicted[i]) {
             exceptions.agree(1);
         } else {
-            exceptions.add(pack(at[slot].flow));
+            exceptions.add(flows[i]);
         }
     }
 }
 
-void encode_flow_section(Bytes& out, const SignatureRuns& runs, const SlotRoles& roles,
-                         std::span<const Limit> limits, Plane& plane, const ColumnsLayout& layout) {
+// A packed flow's parts: x, y, z.
+constexpr std::array<unsigned, 3> kFlowShifts = {0, 8, 16};
+
+void encode_flow_section(Bytes& out, SlotValues& values, const SignatureRuns& runs,
+                         const SlotRoles& roles, Plane& plane, const ColumnsLayout& layout) {
     const std::vector<FlowRun> cut = flow_runs(runs, layout);
-    const PlaneCells planes = flow_planes(runs, cut, roles);
+    const PlaneCells planes = flow_planes(runs, cut, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
-        for (const auto part : kFlowParts) {
-            visit_plane(plane, planes[i], limits, [part](std::uint32_t& cell, const Limit& limit) {
-                cell = bits_of(limit.flow.*part);
-            });
+        for (const unsigned shift : kFlowShifts) {
+            for (const SlotCells& part : planes[i]) {
+                std::uint32_t* cells = plane.row(part.z) + part.x;
+                for (std::uint32_t cell = 0; cell < part.count; ++cell) {
+                    cells[cell] = part.values[cell] >> shift;  // coded modulo 256
+                }
+            }
             encode_bytes(out, plane);
         }
     }
     Exceptions exceptions;
-    for_each_derived_flow(runs, cut, roles, limits,
-                          [&](const Limit* column, std::size_t stride, std::size_t count,
-                              std::size_t slot, const FlowSlot& role) {
-                              add_flow_exceptions(exceptions, column, stride, count, slot, role);
-                          });
+    for_each_derived_flow(
+        runs, cut, roles, values,
+        [&](const std::uint32_t* flows, const std::uint32_t* predicted, std::size_t count) {
+            add_flow_exceptions(exceptions, flows, predicted, count);
+        });
     exceptions.append_to(out);
 }
 
-bool decode_flow_section(std::span<Limit> limits, ByteReader& in, const SignatureRuns& runs,
+bool decode_flow_section(SlotValues& values, ByteReader& in, const SignatureRuns& runs,
                          const SlotRoles& roles, Plane& plane, const ColumnsLayout& layout) {
     const std::vector<FlowRun> cut = flow_runs(runs, layout);
-    const PlaneCells planes = flow_planes(runs, cut, roles);
+    const PlaneCells planes = flow_planes(runs, cut, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
-        for (const auto part : kFlowParts) {
+        for (const unsigned shift : kFlowShifts) {
             if (!decode_bytes(plane, in)) {
                 return false;
             }
-            visit_plane(plane, planes[i], limits, [part](std::uint32_t cell, Limit& limit) {
-                limit.flow.*part = static_cast<std::int8_t>(cell);
-            });
+            for (const SlotCells& part : planes[i]) {
+                const std::uint32_t* cells = plane.row(part.z) + part.x;
+                for (std::uint32_t cell = 0; cell < part.count; ++cell) {
+                    const std::uint32_t bits = (cells[cell] & 0xFFU) << shift;
+                    part.values[cell] = shift == 0 ? bits : part.values[cell] | bits;
+                }
+            }
         }
     }
     ExceptionReader exceptions(in);
-    for_each_derived_flow(runs, cut, roles, limits,
-                          [&](Limit* column, std::size_t stride, std::size_t count,
-                              std::size_t slot, const FlowSlot& role) {
-                              const bool plain = exceptions.skip(count);
-                              for (std::size_t i = 0; i < count; ++i, column += stride) {
-                                  const auto other = plain ? std::nullopt : exceptions.next();
-                                  column[slot].flow =
-                                      other ? unpack(*other) : predicted_flow(column, role);
-                              }
-                          });
-    return exceptions.finished();
-}
-
-void fill_columns(ColumnGrid& columns, const SignatureRuns& runs) {
-    columns.limits.resize(runs.limit_count);
-    columns.offsets.assign(1, 0);
-    Limit* next = columns.limits.data();
-    std::uint32_t offset = 0;
-    for (const SignatureRun& run : runs.runs) {
-        const auto ids = runs.table[run.signature];
-        for (std::uint32_t i = 0; i < run.length; ++i) {
-            for (const std::uint16_t id : ids) {
-                *next++ = {.y256 = 0, .palette_id = id, .flow = {}};
+    for_each_derived_flow(
+        runs, cut, roles, values,
+        [&](std::uint32_t* flows, const std::uint32_t* predicted, std::size_t count) {
+            const bool plain = exceptions.skip(count);
+            for (std::size_t i = 0; i < count; ++i) {
+                const auto other = plain ? std::nullopt : exceptions.next();
+                flows[i] = other ? static_cast<std::uint32_t>(*other) : predicted[i];
             }
-            offset += static_cast<std::uint32_t>(ids.size());
-            columns.offsets.push_back(offset);
-        }
-    }
+        });
+    return exceptions.finished();
 }
 
 }  // namespace
@@ -508,15 +385,16 @@ void encode_columns(Bytes& out, const ColumnGrid& columns, const Palette& palett
                     const ColumnsLayout& layout) {
     const SignatureRuns runs = find_runs(columns);
     encode_runs(out, runs, static_cast<std::size_t>(layout.width));
-    const std::vector<std::int32_t> blends = fit_blends(runs, palette, columns.limits);
+    SlotValues values = split_slots(runs, columns.limits);
+    const std::vector<std::int32_t> blends = fit_blends(runs, palette, values);
     for (const std::int32_t blend : blends) {
         ByteWriter(out).varint(static_cast<std::uint64_t>(blend));
     }
     const SlotRoles roles = roles_of(runs.table, palette, blends);
     const auto plane = std::make_unique<Plane>();
-    encode_heights_section(out, runs, roles, columns.limits, *plane);
+    encode_heights_section(out, values, runs, roles, *plane);
     if (layout.with_flow) {
-        encode_flow_section(out, runs, roles, columns.limits, *plane, layout);
+        encode_flow_section(out, values, runs, roles, *plane, layout);
     }
 }
 
@@ -539,14 +417,18 @@ Result<void> decode_columns(ColumnGrid& columns, ByteReader& in, const Palette& 
         blends.push_back(static_cast<std::int32_t>(*blend));
     }
     const SlotRoles roles = roles_of(runs.table, palette, blends);
-    fill_columns(columns, runs);
+    SlotValues values(runs.limit_count);
     const auto plane = std::make_unique<Plane>();
-    if (!decode_heights_section(columns.limits, in, runs, roles, *plane)) {
+    if (!decode_heights_section(values, in, runs, roles, *plane)) {
         return fail(ErrorCode::malformed, "columns: heights are cut short or out of range");
     }
-    if (layout.with_flow && !decode_flow_section(columns.limits, in, runs, roles, *plane, layout)) {
+    if (layout.with_flow && !decode_flow_section(values, in, runs, roles, *plane, layout)) {
         return fail(ErrorCode::malformed, "columns: flow is cut short or out of range");
     }
+    if (!layout.with_flow) {
+        values.clear_flows(runs.limit_count);
+    }
+    join_slots(columns, values, runs);
     return {};
 }
 

@@ -22,6 +22,8 @@ struct SignatureTable {
 
     std::size_t size() const { return offsets.size() - 1; }
 
+    std::size_t slots(std::size_t i) const { return offsets[i + 1] - offsets[i]; }
+
     std::span<const std::uint16_t> operator[](std::size_t i) const {
         return std::span(palette_ids).subspan(offsets[i], offsets[i + 1] - offsets[i]);
     }
