@@ -1,8 +1,8 @@
 #include "generator/terrain/column_writer.h"
 
-#include "generator/terrain/choose_composition.h"
-
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
 #include <span>
 
 namespace terrane {
@@ -10,36 +10,32 @@ namespace {
 
 constexpr std::uint16_t kNone = 0xffff;
 
-Flow unpack_flow(std::int32_t packed) {
-    const auto bits = static_cast<std::uint32_t>(packed);
-    return {.x = static_cast<std::int8_t>(bits & 255U),
-            .y = static_cast<std::int8_t>((bits >> 8U) & 255U),
-            .z = static_cast<std::int8_t>((bits >> 16U) & 255U)};
+/// Palette id and flow as they lie in a limit behind its height.
+std::uint64_t tail_of(std::size_t id, std::int32_t packed_flow) {
+    return id | std::uint64_t{static_cast<std::uint32_t>(packed_flow)} << 16U;
 }
 
-/// Height at which the blend of an interval (bottom, top] ends. `blend` > 0.
-std::int32_t blend_top(std::int32_t bottom, std::int32_t top, std::int32_t blend) {
-    return bottom + std::min(top - bottom, std::max(1, ((top - bottom) * blend + 128) >> 8));
+void put(Limit* to, std::int32_t y256, std::uint64_t tail) {
+    static_assert(sizeof(Limit) == sizeof y256 + sizeof tail && offsetof(Limit, palette_id) == 4 &&
+                  offsetof(Limit, flow) == 6);
+    std::memcpy(static_cast<void*>(to), &y256, sizeof y256);
+    std::memcpy(&to->palette_id, &tail, sizeof tail);
 }
 
-/// One column's rasters.
+/// One column's rasters: layer k's values lie k planes further.
 struct ColumnSource {
     const Region& region;
-    std::size_t at = 0;       ///< place in the region's height rasters
-    std::size_t flow_at = 0;  ///< place in its flow rasters
-    bool has_flow = false;
+    const std::int32_t* y256 = nullptr;
+    const float* height = nullptr;
+    const std::int32_t* flow = nullptr;  ///< packed; of no flow, a zero
+    std::ptrdiff_t plane = 0;
+    std::ptrdiff_t flow_plane = 0;
+    std::uint64_t gaps = 0;  ///< bit g: an element stands in gap g
+    std::int32_t column = 0;
+    std::int32_t row = 0;
 
-    std::int32_t y256(std::size_t layer) const {
-        return region.y256[layer * region.plane_size() + at];
-    }
-
-    float height(std::size_t layer) const {
-        return region.heights[layer * region.plane_size() + at];
-    }
-
-    Flow flow(std::size_t layer) const {
-        return has_flow ? unpack_flow(region.flow[layer * region.flow_plane_size() + flow_at])
-                        : Flow{};
+    std::int32_t flow_of(std::size_t layer) const {
+        return flow[static_cast<std::ptrdiff_t>(layer) * flow_plane];
     }
 };
 
@@ -48,82 +44,99 @@ class ColumnWalk {
   public:
     ColumnWalk(Limit* out, const ColumnSource& source, const std::vector<LayerRules>& rules,
                std::span<std::uint16_t> element_ids)
-        : first_(out), out_(out), source_(source), rules_(rules), element_ids_(element_ids) {}
+        : out_(out), source_(source), rules_(rules), element_ids_(element_ids) {}
 
-    Limit* write(std::int32_t column, std::int32_t row) {
-        const Region& region = source_.region;
+    Limit* write() {
         const std::size_t layers = rules_.size();
-        const std::uint64_t gaps = region.gap_mask[source_.at];
+        const std::int32_t* y256 = source_.y256;
+        const std::int32_t* flow = source_.flow;
         for (std::size_t k = 0; k < layers; ++k) {
-            layer(k);
-            if ((gaps >> k & 1U) == 0) {
-                continue;
+            if (*y256 > bottom_) {
+                layer(*y256, k, tail_of(k, *flow));
             }
-            const std::size_t end =
-                k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
-            float current = source_.height(k);
-            bool first_owner = true;
-            for (std::size_t e = end; e > region.gap_begin[k]; --e) {
-                const float thickness = thickness_at(region.elements[e - 1], column, row);
-                const float top = source_.height(k) + thickness;
-                if (thickness > 0 && top > current) {
-                    element(e - 1, k, top, first_owner);
-                    first_owner = false;
-                    current = top;
-                }
+            if ((source_.gaps >> k & 1U) != 0) {
+                elements(k);
             }
+            y256 += source_.plane;
+            flow += source_.flow_plane;
         }
-        add(bottom_, static_cast<std::uint16_t>(layers), {});
+        put(out_++, bottom_, tail_of(layers, 0));
         return out_;
     }
 
   private:
-    void layer(std::size_t k) {
-        const std::int32_t top = source_.y256(k);
-        if (top <= bottom_) {
-            return;
-        }
+    void layer(std::int32_t top, std::size_t k, std::uint64_t tail) {
         const LayerRules& rule = rules_[k];
-        const bool blends = from_ != kNone && rule.blend > 0 && !rule.alone && !rules_[from_].alone;
-        interval(top, static_cast<std::uint16_t>(k), source_.flow(k), blends ? rule.blend : 0);
-        from_ = static_cast<std::uint16_t>(k);
+        const std::int32_t blend = below_alone_ || rule.alone ? 0 : rule.blend;
+        if (bottom_ == 0) {
+            put(out_++, 0, tail);
+        } else {
+            if (on_element_) {  // what is below shows the element: begin anew
+                put(out_++, bottom_, blend > 0 ? below_ : tail);
+            }
+            if (blend > 0 || !on_element_) {
+                blend_or_frontier(top, blend, tail);
+            }
+        }
+        put(out_++, top, tail);
+        bottom_ = top;
+        below_ = tail;
+        below_alone_ = rule.alone;
+        on_element_ = false;
     }
 
-    void element(std::size_t e, std::size_t k, float height, bool first_owner) {
-        const std::int32_t top = static_cast<std::int32_t>(height * 256.0F + 0.5F);
+    /// The limit where `tail` alone begins to be shown; left out if that is only at its top.
+    void blend_or_frontier(std::int32_t top, std::int32_t blend, std::uint64_t tail) {
+        const std::int32_t thickness = top - bottom_;
+        const std::int32_t part = std::max(blend > 0 ? 1 : 0, (thickness * blend + 128) >> 8);
+        put(out_, bottom_ + part, tail);
+        out_ += part < thickness ? 1 : 0;
+    }
+
+    /// The elements of gap k, last first: each owns what rises above those before it.
+    void elements(std::size_t k) {
+        const Region& region = source_.region;
+        const std::size_t end =
+            k + 1 < rules_.size() ? region.gap_begin[k + 1] : region.elements.size();
+        const float height = source_.height[static_cast<std::ptrdiff_t>(k) * source_.plane];
+        float current = height;
+        bool first_owner = true;
+        for (std::size_t e = end; e > region.gap_begin[k]; --e) {
+            const float thickness = thickness_at(region.elements[e - 1]);
+            const float top = height + thickness;
+            if (thickness > 0 && top > current) {
+                element(e - 1, k, static_cast<std::int32_t>(top * 256.0F + 0.5F), first_owner);
+                first_owner = false;
+                current = top;
+            }
+        }
+    }
+
+    void element(std::size_t e, std::size_t k, std::int32_t top, bool first_owner) {
         if (top <= bottom_) {
             return;
         }
         const Element& own = source_.region.elements[e].element();
         const bool is_cave = own.type == ElementType::cave;
-        const bool blends = first_owner && from_ != kNone && own.blend > 0 && !is_cave &&
-                            !own.content.alone && !rules_[from_].alone;
-        const auto id = static_cast<std::uint16_t>(rules_.size() + 1 + e);
+        const bool blends = first_owner && own.blend > 0 && !below_alone_;
+        const std::uint64_t tail = tail_of(rules_.size() + 1 + e, is_cave ? 0 : source_.flow_of(k));
         element_ids_[e] = 0;
-        interval(top, id, is_cave ? Flow{} : source_.flow(k), blends ? own.blend : 0);
-    }
-
-    void interval(std::int32_t top, std::uint16_t id, Flow flow, std::int32_t blend) {
-        if (blend > 0) {
-            add(bottom_, from_, source_.flow(from_));
-            add(blend_top(bottom_, top, blend), id, flow);
+        if (blends) {
+            if (on_element_) {
+                put(out_++, bottom_, below_);
+            }
+            blend_or_frontier(top, own.blend, tail);
         } else {
-            add(bottom_, id, flow);
+            put(out_++, bottom_, tail);
         }
-        add(top, id, flow);
+        put(out_++, top, tail);
         bottom_ = top;
+        on_element_ = true;
     }
 
-    void add(std::int32_t y256, std::uint16_t id, Flow flow) {
-        if (out_ != first_ && out_[-1].y256 == y256 && out_[-1].palette_id == id) {
-            return;
-        }
-        *out_++ = {.y256 = y256, .palette_id = id, .flow = flow};
-    }
-
-    float thickness_at(const PlacedElement& placed, std::int32_t column, std::int32_t row) const {
-        const std::int32_t x = column - placed.column_first;
-        const std::int32_t z = row - placed.row_first;
+    float thickness_at(const PlacedElement& placed) const {
+        const std::int32_t x = source_.column - placed.column_first;
+        const std::int32_t z = source_.row - placed.row_first;
         if (x < 0 || z < 0 || x >= placed.columns || z >= placed.rows) {
             return 0;
         }
@@ -131,13 +144,14 @@ class ColumnWalk {
             .thickness[placed.raster + static_cast<std::size_t>(z * placed.stride + x)];
     }
 
-    Limit* first_;
     Limit* out_;
     const ColumnSource& source_;
     const std::vector<LayerRules>& rules_;
     std::span<std::uint16_t> element_ids_;  ///< kNone, or 0 once the element owns a limit
     std::int32_t bottom_ = 0;
-    std::uint16_t from_ = kNone;  ///< the last layer with something of its own below
+    std::uint64_t below_ = 0;  ///< tail of the last layer with something of its own below
+    bool below_alone_ = false;
+    bool on_element_ = false;  ///< the last limit shows an element, not that layer
 };
 
 /// Gives the elements that own limits the ids after the void, in their order. `element_ids` says
@@ -208,12 +222,7 @@ class RowWriter {
                 }
                 continue;
             }
-            const ColumnSource source{
-                .region = region_,
-                .at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1),
-                .flow_at = has_flow ? static_cast<std::size_t>(z_ * region_.flow_stride + x) : 0,
-                .has_flow = has_flow};
-            out = ColumnWalk(out, source, rules_, element_ids_).write(x + 1, z_ + 1);
+            out = ColumnWalk(out, source_at(x, has_flow), rules_, element_ids_).write();
             *end_of++ = static_cast<std::uint32_t>(out - base);
             ++x;
         }
@@ -221,6 +230,20 @@ class RowWriter {
     }
 
   private:
+    ColumnSource source_at(std::int32_t x, bool has_flow) const {
+        static constexpr std::int32_t kNoFlow = 0;
+        const auto at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1);
+        return {.region = region_,
+                .y256 = region_.y256.data() + at,
+                .height = region_.heights.data() + at,
+                .flow = has_flow ? plain_.flow + x + 1 : &kNoFlow,
+                .plane = static_cast<std::ptrdiff_t>(plain_.plane),
+                .flow_plane = has_flow ? static_cast<std::ptrdiff_t>(plain_.flow_plane) : 0,
+                .gaps = region_.gap_mask[at],
+                .column = x + 1,
+                .row = z_ + 1};
+    }
+
     const Region& region_;
     const std::vector<LayerRules>& rules_;
     const RowKernels& kernels_;
