@@ -8,25 +8,9 @@
 namespace terrane {
 namespace {
 
-/// What is solid, by palette id. The layers come first in a palette, so most ids need no look-up.
-struct SolidIds {
-    const Palette& palette;
-    std::uint16_t layers = 0;
-
-    explicit SolidIds(const Palette& entries) : palette(entries) {
-        while (layers < palette.size() && palette[layers].kind == PaletteKind::layer) {
-            ++layers;
-        }
-    }
-
-    bool is_solid(std::uint16_t id) const {
-        TERRANE_DEBUG_ASSERT(id < palette.size());
-        return id < layers || palette[id].is_solid();
-    }
-};
-
 /// Appends the column's ends to `out`.
-void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits, const SolidIds& ids) {
+void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits,
+                 std::span<const std::uint8_t> is_hollow) {
     bool is_solid = true;  // the ground
     for (std::size_t i = 0; i < limits.size(); ++i) {
         const Limit& low = limits[i];
@@ -35,7 +19,7 @@ void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits, cons
             continue;  // no height between them
         }
         const bool is_solid_above =
-            !is_last && ids.is_solid(low.palette_id) && ids.is_solid(limits[i + 1].palette_id);
+            !is_last && is_hollow[low.palette_id] == 0 && is_hollow[limits[i + 1].palette_id] == 0;
         if (is_solid_above != is_solid) {
             // A top shows what is under it: the first limit at its height.
             std::size_t shown = i;
@@ -97,20 +81,23 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
     out.simple_from256.resize(count);
     out.many.clear();
     out.many_ends.clear();
-    const SolidIds ids(stack.palette);
-    // Nearly all limits show layers; the others are listed first, without a jump for each.
-    out.not_layers.resize(grid.limits.size() + 1);
-    std::uint32_t* const others = out.not_layers.data();
-    std::size_t others_count = 0;
-    for (std::uint32_t i = 0; i < grid.limits.size(); ++i) {
-        others[others_count] = i;
-        others_count += grid.limits[i].palette_id >= ids.layers ? 1U : 0U;
+    out.is_hollow.clear();
+    for (const PaletteEntry& entry : stack.palette) {
+        out.is_hollow.push_back(entry.is_solid() ? 0 : 1);
     }
-    others[others_count] = UINT32_MAX;
+    // Few limits are not solid but a column's last; they are listed without a jump for each.
+    out.hollow_limits.resize(grid.limits.size() + 1);
+    std::uint32_t* const hollow = out.hollow_limits.data();
+    std::size_t hollow_count = 0;
+    for (std::uint32_t i = 0; i < grid.limits.size(); ++i) {
+        hollow[hollow_count] = i;
+        hollow_count += out.is_hollow[grid.limits[i].palette_id];
+    }
+    hollow[hollow_count] = UINT32_MAX;
 
     out.lowest256 = INT32_MAX;
     out.highest256 = INT32_MIN;
-    const std::uint32_t* other = others;
+    const std::uint32_t* next_hollow = hollow;
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t begin = grid.offsets[i];
         const std::uint32_t end = grid.offsets[i + 1];
@@ -118,20 +105,21 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
         SolidEnd top = {.y256 = last->y256,
                         .palette_id = last[begin < end - 1 ? -1 : 0].palette_id};
         std::int32_t bottom256 = -kEndlessly256;
-        // Layers up to the top and void above: one end. Anything else is read limit by limit.
-        const bool is_plain = *other == end - 1 && end - begin > 1 && last[-1].y256 == last->y256 &&
-                              !ids.is_solid(last->palette_id);
+        // Solid up to the top and void above: one end. Anything else is read limit by limit.
+        const bool is_plain =
+            *next_hollow == end - 1 && end - begin > 1 && last[-1].y256 == last->y256;
         if (!is_plain) {
             const std::size_t before = out.many_ends.size();
-            append_ends(out.many_ends, std::span(grid.limits).subspan(begin, end - begin), ids);
+            append_ends(out.many_ends, std::span(grid.limits).subspan(begin, end - begin),
+                        out.is_hollow);
             const std::size_t ends = out.many_ends.size() - before;
             out.many.push_back(static_cast<std::uint32_t>(i));
             out.many.push_back(static_cast<std::uint32_t>(ends));
             top = out.many_ends.back();
             bottom256 = ends > 1 ? out.many_ends[out.many_ends.size() - 2].y256 : bottom256;
         }
-        while (*other < end) {
-            ++other;
+        while (*next_hollow < end) {
+            ++next_hollow;
         }
         out.top256[i] = top.y256;
         out.top_id[i] = top.palette_id;

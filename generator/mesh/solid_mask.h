@@ -64,9 +64,10 @@ struct SolidColumns {
     }
 
     /// Scratch of find_solid_columns.
-    std::vector<std::uint32_t> not_layers;  ///< the limits that show no layer
-    std::vector<SolidEnd> many_ends;        ///< of the columns that have more than one, in order
-    std::vector<std::uint32_t> many;        ///< those columns, and how many ends each has
+    std::vector<std::uint8_t> is_hollow;       ///< by palette id: 1 for void and caves
+    std::vector<std::uint32_t> hollow_limits;  ///< the limits that show such a thing
+    std::vector<SolidEnd> many_ends;           ///< of the columns that have more than one, in order
+    std::vector<std::uint32_t> many;           ///< those columns, and how many ends each has
 };
 
 /// Overwrites `out`; allocates only while its buffers grow. Needs: columns of at least one limit.

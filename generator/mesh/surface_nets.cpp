@@ -125,7 +125,10 @@ class VertexMaker {
             made.shade = of_cliff(corners, index, floor256);
         } else {
             const std::size_t first = column(index, std::countr_zero(crossed));
-            made.shade = shades_[is_open ? columns_.top_id[first] : end_id(first, floor256)].shade;
+            made.shade =
+                shades_[is_open ? columns_.top_id[first]
+                                : columns_.end(first, end_from(first, floor256)).palette_id]
+                    .shade;
         }
         return made;
     }
@@ -142,22 +145,33 @@ class VertexMaker {
         return Lanes{here[0], here[1], next_z[0], next_z[1]};
     }
 
-    /// What shows at a column's first end that is not below the floor.
-    std::uint16_t end_id(std::size_t column, std::int32_t floor256) const {
+    /// The column's first end that is not below a height. Needs: there is one.
+    std::size_t end_from(std::size_t column, std::int32_t y256) const {
         std::size_t i = 0;
-        while (columns_.end(column, i).y256 < floor256) {
+        while (columns_.end(column, i).y256 < y256) {
             ++i;
         }
-        return columns_.end(column, i).palette_id;
+        return i;
     }
 
+    /// What shows on a steep side. Layers lie over slopes like blankets, so within 4 voxels of an
+    /// end of its column (76 degrees) a side shows what that end does: a point of the lattice may
+    /// be deeper in the ground than a layer is thick. Only a higher wall shows what is inside.
     Shade of_cliff(const CellCorners& corners, std::size_t index, std::int32_t floor256) const {
-        const Corner end = solid_end_of_level_edge(corners);
+        const Corner solid = solid_end_of_level_edge(corners);
+        const std::size_t at = column(index, solid.lane);
+        const std::int32_t y256 = floor256 + (solid.is_high ? kUnitsPerVoxel : 0);
+        if (corners.distance[solid.lane + (solid.is_high ? 4 : 0)] < kDistanceMax256) {
+            const std::size_t i = end_from(at, y256);
+            const SolidEnd above = columns_.end(at, i);
+            const bool is_under =
+                i == 0 || above.y256 - y256 <= y256 - columns_.end(at, i - 1).y256;
+            return shades_[is_under ? above.palette_id : columns_.end(at, i - 1).palette_id].shade;
+        }
         const ColumnGrid& grid = stack_.columns;
-        const std::uint32_t first = grid.offsets[column(index, end.lane)];
-        const std::uint32_t last = grid.offsets[column(index, end.lane) + 1];
-        return shade_at(std::span(grid.limits).subspan(first, last - first),
-                        floor256 + (end.is_high ? kUnitsPerVoxel : 0), stack_.palette, shades_);
+        return shade_at(std::span(grid.limits)
+                            .subspan(grid.offsets[at], grid.offsets[at + 1] - grid.offsets[at]),
+                        y256, stack_.palette, shades_);
     }
 
     const Stack& stack_;

@@ -176,6 +176,39 @@ TEST(SurfaceNets, ColorsAreLinearAndMixWithTheComposition) {
     EXPECT_NEAR(at(512).g, (shades[0].color.g + shades[1].color.g) / 2 * 255, 0.5);
 }
 
+TEST(SurfaceNets, AWallShowsItsStrataButASlopeOnlyItsTop) {
+    const Letters letters("abc.");
+    const Stack wall = stack_of_columns({}, 4, letters.palette(), [&](ColumnPos at) {
+        return letters.column(at.x < 2 ? "aaaaaabbbbbbbbbc" : "a");
+    });
+    const Mesh wall_mesh = mesh_of(letters, wall, {.first = 0, .last = 20});
+    int in_a = 0;
+    int in_b = 0;
+    for (std::size_t i = 0; i < wall_mesh.vertex_count(); ++i) {
+        const std::int32_t y = wall_mesh.positions256[i].y / 256;
+        if (y >= 2 && y < 11) {
+            EXPECT_EQ(wall_mesh.material_ids[i], letters.id(y < 6 ? 'a' : 'b')) << y;
+            ++(y < 6 ? in_a : in_b);
+        }
+    }
+    EXPECT_GT(in_a, 15);
+    EXPECT_GT(in_b, 15);
+
+    const Stack slope = stack_of_columns({}, 8, letters.palette(), [&](ColumnPos at) {
+        const auto top = static_cast<std::int32_t>(300 + 800 * (at.x + 1));  // 72 degrees
+        return std::vector<Limit>{{0, letters.id('a'), {}},
+                                  {top - 30, letters.id('a'), {}},
+                                  {top - 30, letters.id('c'), {}},
+                                  {top, letters.id('c'), {}},
+                                  {top, letters.id('.'), {}}};
+    });
+    const Mesh slope_mesh = mesh_of(letters, slope, {.first = 0, .last = 40});
+    EXPECT_GT(slope_mesh.vertex_count(), 200U);
+    for (const std::uint8_t material : slope_mesh.material_ids) {
+        EXPECT_EQ(material, letters.id('c'));
+    }
+}
+
 // The rule of the method, written out with no bits: the vertex of every cell that a mesh has.
 struct Crossings {
     std::int32_t x = 0, y = 0, z = 0, count = 0;
