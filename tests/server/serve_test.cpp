@@ -1,0 +1,209 @@
+// terrane serve as a process of its own: what it prints, how it stops, its exit codes.
+#include "protocol/wire/messages.h"
+#include "server/cli/program.h"
+#include "tests/server/raw_client.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace terrane {
+namespace {
+
+std::string world_path() {
+    return std::string(TERRANE_SOURCE_DIR) + "/generator/worlds/paper-B2.toml";
+}
+
+/// A folder that goes away with the test.
+struct Folder {
+    Folder() {
+        std::string name =
+            (std::filesystem::temp_directory_path() / "terrane-serve-XXXXXX").string();
+        path = ::mkdtemp(name.data());
+    }
+
+    ~Folder() { std::filesystem::remove_all(path); }
+
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+
+    std::filesystem::path path;
+};
+
+int run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"terrane", "serve"});
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) {
+        argv.push_back(argument.data());
+    }
+    return run_program(static_cast<int>(argv.size()), argv.data());
+}
+
+/// `terrane serve` in a child, listening on a port of the system's choice.
+class ServeProcess {
+  public:
+    explicit ServeProcess(std::vector<std::string> arguments) {
+        std::array<int, 2> pipe{};
+        EXPECT_EQ(::pipe(pipe.data()), 0);
+        child_ = ::fork();
+        if (child_ == 0) {
+            ::dup2(pipe[1], STDOUT_FILENO);
+            ::close(pipe[0]);
+            ::close(pipe[1]);
+            arguments.insert(arguments.end(), {"--tcp", "127.0.0.1:0"});
+            ::_exit(run(std::move(arguments)));
+        }
+        ::close(pipe[1]);
+        std::array<char, 256> buffer{};
+        while (line_.find('\n') == std::string::npos) {
+            const ssize_t got = ::read(pipe[0], buffer.data(), buffer.size());
+            if (got <= 0) {
+                break;
+            }
+            line_.append(buffer.data(), static_cast<std::size_t>(got));
+        }
+        ::close(pipe[0]);
+    }
+
+    ~ServeProcess() {
+        if (child_ > 0) {
+            signal(SIGKILL);
+            wait();
+        }
+    }
+
+    ServeProcess(const ServeProcess&) = delete;
+    ServeProcess& operator=(const ServeProcess&) = delete;
+
+    /// What it said when it was ready.
+    const std::string& line() const { return line_; }
+
+    std::uint16_t port() const {
+        const std::string before = "listening on tcp 127.0.0.1:";
+        EXPECT_TRUE(line_.starts_with(before)) << line_;
+        return static_cast<std::uint16_t>(std::atoi(line_.c_str() + before.size()));
+    }
+
+    void signal(int number) const { ::kill(child_, number); }
+
+    /// The wait status.
+    int wait() {
+        int status = 0;
+        ::waitpid(child_, &status, 0);
+        child_ = 0;
+        return status;
+    }
+
+  private:
+    pid_t child_ = 0;
+    std::string line_;
+};
+
+ChunkRequest row_of(std::uint32_t id) {
+    ChunkRequest request;
+    request.request_id = id;
+    for (std::int32_t x = 0; x < 64; ++x) {
+        request.keys.push_back({.lod = 0, .x = x, .y = 0, .z = static_cast<std::int32_t>(id)});
+    }
+    return request;
+}
+
+TEST(Serve, StopsUnderLoadWithAGoodbyeAndEveryAnswer) {
+    for (int round = 0; round < 10; ++round) {
+        ServeProcess serve({"--world", world_path(), "--store", "memory", "--log-level", "off"});
+        std::optional<RawClient> connection(std::in_place, serve.port());
+        RawClient& client = *connection;
+        ASSERT_TRUE(client.hello());
+        client.send(row_of(1));
+        client.send(row_of(2));
+        std::size_t chunks = 0;
+        while (chunks < 70) {  // both requests are read by then
+            const auto received = client.next();
+            ASSERT_TRUE(received);
+            chunks += std::holds_alternative<ChunkAnswer>(received->message) ? 1U : 0U;
+        }
+        serve.signal(round % 2 == 0 ? SIGTERM : SIGINT);
+        bool goodbye = false;
+        while (const auto received = client.next()) {
+            chunks += std::holds_alternative<ChunkAnswer>(received->message) ? 1U : 0U;
+            goodbye = goodbye || std::holds_alternative<Goodbye>(received->message);
+        }
+        EXPECT_TRUE(goodbye);
+        EXPECT_EQ(chunks, 128U);
+        if (round >
+            0) {  // a client that keeps its end open is waited for two seconds, not for ever
+            connection.reset();
+        }
+        const int status = serve.wait();
+        ASSERT_TRUE(WIFEXITED(status));
+        EXPECT_EQ(WEXITSTATUS(status), kExitDone);
+    }
+}
+
+TEST(Serve, ASecondSignalEndsAtOnce) {
+    ServeProcess serve({"--world", world_path(), "--store", "memory", "--log-level", "off"});
+    RawClient client(serve.port());
+    ASSERT_TRUE(client.hello());
+    serve.signal(SIGTERM);
+    ASSERT_TRUE(client.next_as<Goodbye>());  // it waits for the client to close now
+    serve.signal(SIGTERM);
+    const int status = serve.wait();
+    ASSERT_TRUE(WIFSIGNALED(status));
+    EXPECT_EQ(WTERMSIG(status), SIGTERM);
+}
+
+TEST(Serve, SaysWhereItListensAndWhichWorldItIs) {
+    const ServeProcess serve({"--world", world_path(), "--store", "memory", "--log-level", "off"});
+    EXPECT_NE(serve.line().find("world \"paper-B2\", fingerprint "), std::string::npos);
+    EXPECT_EQ(std::count(serve.line().begin(), serve.line().end(), '\n'), 1);
+}
+
+TEST(Serve, APortInUseOrAFolderItCanNotHaveIsAFailure) {
+    const Folder folder;
+    const std::string data = (folder.path / "data").string();
+    const ServeProcess serve({"--world", world_path(), "--data", data, "--log-level", "off"});
+    const std::string port = std::to_string(serve.port());
+    EXPECT_EQ(run({"--world", world_path(), "--store", "memory", "--log-level", "off", "--tcp",
+                   "127.0.0.1:" + port}),
+              kExitFailed);
+    EXPECT_EQ(run({"--world", world_path(), "--data", data, "--log-level", "off", "--tcp",
+                   "127.0.0.1:0"}),
+              kExitFailed)
+        << "the folder is in use";
+    EXPECT_EQ(run({"--world", world_path(), "--data", "/proc/terrane", "--log-level", "off",
+                   "--tcp", "127.0.0.1:0"}),
+              kExitFailed);
+}
+
+TEST(Serve, WrongUseIsExitCodeTwo) {
+    const std::vector<std::string> good{"--world", world_path(), "--store", "memory"};
+    const std::vector<std::vector<std::string>> wrong{
+        {"--tcp", "nowhere"},   {"--tcp", "127.0.0.1:65536"}, {"--workers", "0"},
+        {"--workers", "257"},   {"--cache-mib", "0"},         {"--cache-mib", "-1"},
+        {"--store", "paper"},   {"--log-format", "xml"},      {"--log-level", "loud"},
+        {"--no-such-flag"},     {"--world", "no-such.toml"},  {"extra"},
+        {"--store", "rocksdb"},
+    };
+    for (const auto& flags : wrong) {
+        auto arguments = flags[0] == "--world" || flags[0] == "--store"
+                             ? std::vector<std::string>{"--world", world_path()}
+                             : good;
+        if (flags[0] == "--world") {
+            arguments = {"--store", "memory"};
+        }
+        arguments.insert(arguments.end(), flags.begin(), flags.end());
+        EXPECT_EQ(run(arguments), kExitWrongUse) << flags[0];
+    }
+    EXPECT_EQ(run({}), kExitWrongUse);
+}
+
+}  // namespace
+}  // namespace terrane
