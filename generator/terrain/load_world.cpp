@@ -1,6 +1,13 @@
 #include "generator/terrain/load_world.h"
 
+#include "generator/terrain/world.h"
+#include "generator/world/world_file.h"
+#include "protocol/base/result.h"
+
+#include <filesystem>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace terrane {

@@ -4,15 +4,19 @@
 // canonical text (varint length, bytes), and for each texture in the order of its first material
 // its name and its bytes (varint length, bytes each).
 #include "generator/world/generator_version.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
 #include "generator/world/world_table.h"
 #include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
 
-#include <array>
-#include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,5 +1,8 @@
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
 #include "protocol/base/check.h"
+
+#include <string_view>
 
 namespace terrane {
 

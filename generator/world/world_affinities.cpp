@@ -1,6 +1,13 @@
 #include "generator/world/world_affinities.h"
 
+#include "generator/world/world_definition.h"
+#include "generator/world/world_table.h"
+
+#include <toml++/toml.h>
+
 #include <algorithm>
+#include <cstddef>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>

@@ -5,6 +5,7 @@
 #include "generator/world/world_file.h"
 
 #include "generator/world/world_affinities.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_materials.h"
 #include "generator/world/world_table.h"
 
@@ -12,9 +13,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
+#include <ios>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 

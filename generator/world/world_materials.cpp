@@ -1,9 +1,18 @@
 #include "generator/world/world_materials.h"
 
+#include "generator/world/world_definition.h"
+#include "generator/world/world_file.h"
+#include "generator/world/world_table.h"
+
+#include <toml++/toml.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
+#include <ios>
 #include <limits>
 #include <map>
 #include <optional>
@@ -12,6 +21,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,13 +1,24 @@
 #include "generator/world/world_table.h"
 
+#include "generator/world/world_definition.h"
+#include "generator/world/world_file.h"
+
+#include <toml++/toml.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {
