@@ -167,7 +167,7 @@ inline HalfLanes crossings256(HalfLanes from, HalfLanes to) {
     const HalfLanes divisor = length - is_level;  // 1 instead of 0
     const HalfLanes at =
         narrowed(crossings256(low(from), low(divisor)), crossings256(high(from), high(divisor)));
-    return at + (is_level & static_cast<std::int16_t>(kUnitsPerVoxel / 2));
+    return is_level ? HalfLanes{} + static_cast<std::int16_t>(kUnitsPerVoxel / 2) : at;
 }
 
 /// sum / count for whole sums of at most 12 * 256 and counts of 1..12, rounded as (sum + count / 2)
