@@ -142,24 +142,27 @@ TEST(ForEachBatch, StopsWhenTheTickSaysSo) {
     const auto batches =
         StackBatches::cut({.x_first = 0, .z_first = 0, .x_end = 1024, .z_end = 1024});
     ASSERT_TRUE(batches);
-    std::atomic<bool> stopped = false;
-    // The steps wait for the stop, so it always comes before the end.
+    std::atomic<bool> released = false;
+    int ticks = 0;
+    // The steps wait until the stop has been taken in, so it always comes before the end.
     const auto done =
         for_each_batch(*batches, {.count = 2,
                                   .make_step = [&]() -> BatchStep {
                                       return [&](std::span<const StackPos>) -> Result<void> {
-                                          stopped.wait(false);
+                                          released.wait(false);
                                           return {};
                                       };
                                   },
                                   .tick =
                                       [&](std::uint64_t) {
-                                          stopped = true;
-                                          stopped.notify_all();
+                                          if (++ticks == 2) {
+                                              released = true;
+                                              released.notify_all();
+                                          }
                                           return false;
                                       }});
     ASSERT_TRUE(done);
-    EXPECT_LT(*done, batches->stacks());
+    EXPECT_LE(*done, 2 * kBatchStacksMax) << "the batches under way, no others";
 }
 
 }  // namespace
