@@ -1,0 +1,74 @@
+// A square of columns as rays see it: smooth surfaces through the columns' limits.
+//
+// Columns are samples of a solid: a top surface with caves under it. Between the centres of four
+// columns the heights of the top and of each cave's floor and lid are interpolated, a cave that
+// ends there closing to nothing, so that tops, floors, lids and walls are smooth and meet without
+// steps. Tiles above level 0 know only their top surface.
+#pragma once
+
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+inline constexpr std::int32_t kTileCells = 64;
+inline constexpr std::int32_t kBlockCells = 8;  ///< cells of a block: skipped as one if below a ray
+inline constexpr std::int32_t kBlocksPerSide = kTileCells / kBlockCells;
+inline constexpr float kNoHeight = -1e9F;
+
+/// A cave in one column; heights in voxels.
+struct CaveInterval {
+    std::uint16_t palette_id = 0;
+    float floor = 0;
+    float lid = 0;
+};
+
+/// A point of a tile, in cells from its column (0, 0): 0 <= u, v <= kTileCells. `y` in voxels.
+struct TilePoint {
+    double u = 0;
+    double v = 0;
+    double y = 0;
+};
+
+/// kTileCells cells a side between (kTileCells + 1)^2 columns; row by row, u runs fastest.
+struct SceneTile {
+    std::int32_t lod = 0;
+    float highest = kNoHeight;
+    std::array<float, kBlocksPerSide * kBlocksPerSide> block_highest{};
+    /// Each column's highest point that is not void: solid or, where nothing covers it, a cave's
+    /// lid.
+    std::vector<float> covers;
+    std::vector<float> tops;  ///< each column's highest solid point
+    std::vector<LinearColor> top_colors;
+    /// Level 0 only: caves, bottom first, one column behind the other.
+    std::vector<std::uint32_t> cave_begin;
+    std::vector<CaveInterval> caves;
+    ColumnSet set;
+    std::vector<LinearColor> colors;  ///< of set.palette
+
+    static constexpr std::size_t index_of(std::int32_t u, std::int32_t v) {
+        return static_cast<std::size_t>(v) * (kTileCells + 1) + static_cast<std::size_t>(u);
+    }
+};
+
+/// Makes the tile whose column (0, 0) is `first`. A tile beyond the world's edge is empty:
+/// kNoHeight everywhere.
+SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnPos first,
+                          std::int32_t lod);
+
+/// Above 0 inside the solid; the vertical distance to the nearest surface, in voxels.
+double density_at(const SceneTile& tile, TilePoint point);
+
+/// Height of the highest solid point; `y` is ignored.
+double top_at(const SceneTile& tile, TilePoint point);
+
+/// Colour of the solid at or next to the point.
+LinearColor color_near(const SceneTile& tile, TilePoint point);
+
+}  // namespace terrane

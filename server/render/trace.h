@@ -1,0 +1,31 @@
+// Rays through a scene: what they hit first.
+//
+// A ray goes from cell to cell of the columns' lattice. Tiles and blocks of cells whose highest
+// point it stays above are crossed in one step; in the others it looks at the density several times
+// a cell and closes in on the place where the solid begins.
+#pragma once
+
+#include "server/render/scene.h"
+
+#include <glm/glm.hpp>
+
+#include <optional>
+
+namespace terrane {
+
+struct Ray {
+    glm::dvec3 origin{};
+    glm::dvec3 direction{};  ///< of length 1
+};
+
+struct Hit {
+    double distance = 0;  ///< voxels from the ray's origin
+    glm::dvec3 point{};
+    glm::dvec3 normal{};  ///< of length 1
+    bool cut = false;     ///< on a side of the block
+};
+
+/// The first solid point within `distance_max` voxels. Rays that begin inside the solid hit at 0.
+std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max);
+
+}  // namespace terrane
