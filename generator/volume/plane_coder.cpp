@@ -174,7 +174,7 @@ void write_residuals(const Plane& plane, PlaneOrder order, Write write) {
 /// Adds the predictions that need no cell of this span to the residuals, then sums up.
 void add_first(std::uint32_t* cells, SpanBuffer& residuals, std::size_t length) {
     for (std::size_t i = 0; i < length; ++i) {
-        residuals[i] += predict_first(cells + i) - cells[i - 1];
+        residuals[i] += predict_first(cells + i) - (cells + i)[-1];
     }
     std::uint32_t left = cells[-1];
     for (std::size_t i = 0; i < length; ++i) {
@@ -185,7 +185,7 @@ void add_first(std::uint32_t* cells, SpanBuffer& residuals, std::size_t length) 
 
 void add_second(std::uint32_t* cells, SpanBuffer& residuals, std::size_t length) {
     for (std::size_t i = 0; i < length; ++i) {
-        residuals[i] += predict_second(cells + i) - 2 * cells[i - 1] + cells[i - 2];
+        residuals[i] += predict_second(cells + i) - 2 * (cells + i)[-1] + (cells + i)[-2];
     }
     std::uint32_t left = cells[-1];
     std::uint32_t slope = left - cells[-2];
