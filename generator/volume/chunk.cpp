@@ -67,7 +67,12 @@ void cut_columns(Chunk& out, const Stack& stack, Span256 span, std::uint16_t voi
     columns.offsets.push_back(0);
     for (std::int32_t z = 0; z < stack.side; ++z) {
         for (std::int32_t x = 0; x < stack.side; ++x) {
-            append_cut(columns.limits, stack.columns.column(x, z), span, void_id);
+            const auto column = stack.columns.column(x, z);
+            if (stack.position.lod == 0) {
+                append_cut(columns.limits, column, span, void_id);
+            } else {  // the whole height at once
+                columns.limits.insert(columns.limits.end(), column.begin(), column.end());
+            }
             columns.offsets.push_back(static_cast<std::uint32_t>(columns.limits.size()));
         }
     }
@@ -111,9 +116,10 @@ void localize_palette(Chunk& out, const Palette& palette) {
 }  // namespace
 
 void cut_chunk(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height) {
-    TERRANE_ASSERT(stack.position.lod == 0 && stack.side > 0 && height > 0);
+    TERRANE_ASSERT(stack.side > 0 && height > 0 && (stack.position.lod == 0 || y == 0));
     TERRANE_ASSERT(!stack.palette.empty());
-    out.position = {.lod = 0, .x = stack.position.x, .y = y, .z = stack.position.z};
+    out.position = {
+        .lod = stack.position.lod, .x = stack.position.x, .y = y, .z = stack.position.z};
     out.side = stack.side;
     out.height = height;
     const std::int64_t chunk_units = std::int64_t{height} * kUnitsPerVoxel;

@@ -31,7 +31,8 @@ struct Chunk {
 
 /// Cuts the chunk at height `y` (in chunk heights, any int32) out of `stack`. `out` is overwritten;
 /// its buffers are reused. Below the ground (y < 0) the chunk is uniform base. Thread: any, `out`
-/// being the caller's own. Only level 0.
+/// being the caller's own. At levels above 0 a chunk is its stack's whole columns, whatever their
+/// height, and `y` must be 0.
 void cut_chunk(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height);
 
 }  // namespace terrane

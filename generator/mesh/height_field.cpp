@@ -1,0 +1,114 @@
+#include "generator/mesh/height_field.h"
+
+#include "protocol/base/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace terrane {
+namespace {
+
+constexpr std::int32_t kColumn256 = 256;
+
+/// The highest limit that shows something solid; the base always is.
+const Limit& top_of(std::span<const Limit> column, const Palette& palette) {
+    std::size_t i = column.size() - 1;
+    while (i > 0 && !palette[column[i].palette_id].is_solid()) {
+        --i;
+    }
+    return column[i];
+}
+
+glm::vec3 normal_of(std::int32_t top256, std::int32_t before_x256, std::int32_t before_z256) {
+    constexpr float kScale = 1.0F / 256.0F;
+    const float slope_x = static_cast<float>(top256 - before_x256) * kScale;
+    const float slope_z = static_cast<float>(top256 - before_z256) * kScale;
+    const float length = std::sqrt(slope_x * slope_x + 1.0F + slope_z * slope_z);
+    return {-slope_x / length, 1.0F / length, -slope_z / length};
+}
+
+/// Two triangles of the cell between four vertices, split along the flatter diagonal. `corner` is
+/// the vertex at the cell's (0, 0), `row` the distance to the next row's.
+void add_cell(Mesh& mesh, std::uint32_t corner, std::uint32_t row) {
+    const auto height = [&mesh](std::uint32_t vertex) { return mesh.positions256[vertex].y; };
+    const std::uint32_t a = corner;
+    const std::uint32_t b = corner + 1;
+    const std::uint32_t c = corner + row;
+    const std::uint32_t d = corner + row + 1;
+    const bool along_ad = std::abs(height(a) - height(d)) <= std::abs(height(b) - height(c));
+    if (along_ad) {
+        mesh.indices.insert(mesh.indices.end(), {a, c, d, a, d, b});
+    } else {
+        mesh.indices.insert(mesh.indices.end(), {a, c, b, b, c, d});
+    }
+}
+
+/// Hangs a strip under a run of vertices on a side; the solid lies to the right of the way along
+/// it.
+void add_skirt(Mesh& mesh, std::uint32_t first, std::int64_t stride, std::int32_t count,
+               std::int64_t depth256) {
+    auto below = static_cast<std::uint32_t>(mesh.vertex_count());
+    for (std::int32_t i = 0; i < count; ++i) {
+        const auto at = static_cast<std::uint32_t>(first + i * stride);
+        glm::i32vec3 position = mesh.positions256[at];
+        position.y = static_cast<std::int32_t>(std::max<std::int64_t>(0, position.y - depth256));
+        mesh.positions256.push_back(position);
+        mesh.normals.push_back(glm::vec3(mesh.normals[at]));
+        mesh.colors.push_back(glm::u8vec3(mesh.colors[at]));
+        mesh.material_ids.push_back(std::uint8_t{mesh.material_ids[at]});
+        if (i > 0) {
+            const auto before = static_cast<std::uint32_t>(at - stride);
+            mesh.indices.insert(mesh.indices.end(), {at, before, below, before, below - 1, below});
+        }
+        ++below;
+    }
+}
+
+}  // namespace
+
+HeightFieldMesher::HeightFieldMesher(const WorldDefinition& definition)
+    : material_colors_(linear_colors_of(definition)) {}
+
+void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
+    TERRANE_ASSERT(stack.position.lod >= 1);
+    out.clear();
+    find_palette_shades(shades_, stack.palette, material_colors_);
+    const std::int32_t vertices = stack.side + 1;
+    const std::int32_t row = vertices + 1;  // of tops, which begin at column -1
+    tops256_.resize(static_cast<std::size_t>(row * row));
+    for (std::int32_t z = -1; z < vertices; ++z) {
+        for (std::int32_t x = -1; x < vertices; ++x) {
+            const Limit& top = top_of(stack.columns.column(x, z), stack.palette);
+            const auto at = static_cast<std::size_t>((z + 1) * row + x + 1);
+            tops256_[at] = top.y256;
+            if (x < 0 || z < 0) {
+                continue;
+            }
+            const Shade shade = shades_[top.palette_id].shade;
+            out.positions256.emplace_back(x * kColumn256, top.y256, z * kColumn256);
+            out.normals.push_back(normal_of(top.y256, tops256_[at - 1],
+                                            tops256_[at - static_cast<std::size_t>(row)]));
+            out.colors.emplace_back(shade.r, shade.g, shade.b);
+            out.material_ids.push_back(shade.material);
+        }
+    }
+    const auto side = static_cast<std::uint32_t>(stack.side);
+    const std::uint32_t stride = side + 1;
+    for (std::uint32_t z = 0; z < side; ++z) {
+        for (std::uint32_t x = 0; x < side; ++x) {
+            add_cell(out, z * stride + x, stride);
+        }
+    }
+    if (!with_skirts) {
+        return;
+    }
+    const std::int64_t depth256 = std::int64_t{kSkirtCells * kColumn256} << stack.position.lod;
+    const std::uint32_t last = stride * stride - 1;
+    add_skirt(out, side, -1, vertices, depth256);                                  // z = 0
+    add_skirt(out, last - side, 1, vertices, depth256);                            // z = N
+    add_skirt(out, 0, stride, vertices, depth256);                                 // x = 0
+    add_skirt(out, last, -static_cast<std::int64_t>(stride), vertices, depth256);  // x = N
+}
+
+}  // namespace terrane
