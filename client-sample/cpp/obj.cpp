@@ -41,9 +41,14 @@ std::string obj_of(const Mesh& mesh, ChunkPos key, const ServerHello& world) {
         }
         text += '\n';
     }
+    // A level's tile is wider than it is high by 2^lod; its normals are given before that stretch.
+    const double stretch = column_m / voxel_m;
     for (const auto& n : mesh.normals) {
-        append_line(text, "vn %.4f %.4f %.4f\n", static_cast<double>(n.x), static_cast<double>(n.y),
-                    static_cast<double>(n.z));
+        const double x = static_cast<double>(n.x) / stretch;
+        const double z = static_cast<double>(n.z) / stretch;
+        const double length = std::sqrt(x * x + static_cast<double>(n.y * n.y) + z * z);
+        append_line(text, "vn %.4f %.4f %.4f\n", x / length, static_cast<double>(n.y) / length,
+                    z / length);
     }
     const bool has_normals = mesh.normals.size() == mesh.vertex_count();
     for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {

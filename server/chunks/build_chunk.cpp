@@ -54,7 +54,11 @@ Hash128 content_id_of(const World& world) {
 }
 
 ChunkBuilder::ChunkBuilder(const BuildContext& context)
-    : context_(context), generator_(*context.world), mesher_(context.world->definition) {}
+    : context_(context),
+      generator_(*context.world),
+      mesher_(context.world->definition),
+      tile_mesher_(context.world->definition),
+      tile_height_voxels_(static_cast<std::int32_t>(context.world->stack.height_bound) + 2) {}
 
 Result<Answer> ChunkBuilder::build(const Task& task) {
     if (const auto* chunk = std::get_if<ChunkKey>(&task.key)) {
@@ -200,8 +204,11 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
     const Grid& grid = context_.world->definition.grid;
     const std::int32_t y = key.position.y;
     StageClock clock;
+    const bool is_tile = key.position.lod > 0;
     mesh_.clear();
-    if (!beyond_every_surface(y, grid.height)) {
+    if (is_tile) {
+        tile_mesher_.mesh(mesh_, stack, true);
+    } else if (!beyond_every_surface(y, grid.height)) {
         mesher_.mesh(mesh_, stack, y, grid.height);
     }
     timings.mesh_us = clock.lap_us();
@@ -218,7 +225,8 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
     if (task.stop.stop_requested()) {
         return stopped();
     }
-    auto payload = encode_draco(mesh_, {.side = grid.side, .height_voxels = grid.height + 1});
+    const std::int32_t height_voxels = is_tile ? tile_height_voxels_ : grid.height + 1;
+    auto payload = encode_draco(mesh_, {.side = grid.side, .height_voxels = height_voxels});
     if (!payload) {
         return tl::unexpected(payload.error());
     }

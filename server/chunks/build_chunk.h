@@ -9,6 +9,7 @@
 // a record that can't be read back is made anew and overwritten.
 #pragma once
 
+#include "generator/mesh/height_field.h"
 #include "generator/mesh/surface_nets.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/world.h"
@@ -71,7 +72,9 @@ class ChunkBuilder {
     BuildContext context_;
     StackGenerator generator_;
     SurfaceNetsMesher mesher_;
-    Stack stack_;  // scratch from here on
+    HeightFieldMesher tile_mesher_;
+    std::int32_t tile_height_voxels_;  ///< what the tallest tile of any level needs in Draco's box
+    Stack stack_;                      // scratch from here on
     Chunk chunk_;
     Mesh mesh_;
     Bytes bytes_;

@@ -14,7 +14,7 @@ namespace terrane {
 
 /// Levels of detail that this build can generate: 0..levels_supported() - 1.
 constexpr std::int32_t levels_supported() {
-    return 1;
+    return kLodMax + 1;
 }
 
 /// `without_flow` means something for columns only; `normalised` clears it elsewhere, so that equal

@@ -132,6 +132,11 @@ Result<WorkKey> ChunkService::checked(const WorkKey& key) const {
                                                     ": this server has 0.." +
                                                     std::to_string(levels_supported() - 1));
         }
+        if (lod > 0 && chunk->position.y != 0) {
+            return fail(ErrorCode::out_of_range,
+                        "y " + std::to_string(chunk->position.y) +
+                            ": above level 0 a chunk is the whole height, and its y is 0");
+        }
         if (chunk->format != ChunkFormat::draco && chunk->format != ChunkFormat::columns) {
             return fail(ErrorCode::unsupported,
                         "format " + std::to_string(static_cast<int>(chunk->format)) +
