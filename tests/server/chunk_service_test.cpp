@@ -241,11 +241,14 @@ TEST(ChunkService, AnExceptionFailsOneTaskOnly) {
 
 TEST(ChunkService, RefusesWhatItCanNotMake) {
     Fixture f;
-    for (const std::int32_t lod : {-1, 1, 17, std::numeric_limits<std::int32_t>::max()}) {
+    for (const std::int32_t lod : {-1, kLodMax + 1, std::numeric_limits<std::int32_t>::max()}) {
         const auto answer = f.request(ChunkKey{.position = {.lod = lod, .x = 0, .y = 0, .z = 0}});
         ASSERT_FALSE(answer);
         EXPECT_EQ(answer.error().code, ErrorCode::unsupported);
     }
+    const auto high = f.request(ChunkKey{.position = {.lod = 1, .x = 0, .y = 1, .z = 0}});
+    ASSERT_FALSE(high);
+    EXPECT_EQ(high.error().code, ErrorCode::out_of_range);
     constexpr std::int64_t kEnd = (std::int64_t{1} << 31) * 32;
     for (const std::int64_t at :
          {kEnd, -kEnd - 1, kColumnCoordinateLimit, std::numeric_limits<std::int64_t>::min(),

@@ -67,7 +67,7 @@ TEST(Server, TellsItsWorldInTheHello) {
     ASSERT_TRUE(hello);
     EXPECT_EQ(hello->fingerprint, r.options.world->fingerprint);
     EXPECT_EQ(hello->content_id, content_id_of(*r.options.world));
-    EXPECT_EQ(hello->levels, 1);
+    EXPECT_EQ(hello->levels, kLodMax + 1);
     EXPECT_EQ(hello->materials.size(), r.options.world->definition.materials.size());
     EXPECT_EQ(hello->limits.keys_per_request_max, kKeysPerRequestMax);
     client.send(WorldQuery{.request_id = 9});
@@ -165,7 +165,7 @@ TEST(Server, AnswersTheExtremesOfEveryCoordinate) {
     for (std::size_t i = 0; i < keys.size(); ++i) {
         EXPECT_TRUE(client.next_as<ChunkAnswer>());
     }
-    for (const std::int32_t lod : {kMin, -1, 1, kLodMax, kMax}) {
+    for (const std::int32_t lod : {kMin, -1, kLodMax + 1, kMax}) {
         client.send(request_of(2, {{.lod = lod, .x = 0, .y = 0, .z = 0}}));
         const auto failure = client.next_as<Failure>();
         ASSERT_TRUE(failure);

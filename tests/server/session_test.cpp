@@ -211,7 +211,7 @@ TEST(Session, SaysNotModifiedWhenTheEtagIsKnown) {
 TEST(Session, FailsTheKeyThatCanNotBeMadeAndGoesOn) {
     Fixture f;
     f.hello();
-    f.request(7, {{.lod = 3, .x = 1, .y = 0, .z = 0}, at(1, 666), at(1)});
+    f.request(7, {{.lod = kLodMax + 1, .x = 1, .y = 0, .z = 0}, at(1, 666), at(1)});
     f.mailbox.run(2);
     int failures = 0;
     for (const AnyMessage& message : f.read()) {
