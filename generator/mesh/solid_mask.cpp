@@ -49,6 +49,7 @@ void fill_planes(SolidColumns& out) {
               kEndlessly256);
     std::fill(out.plane_ids.begin() + static_cast<std::ptrdiff_t>(count), out.plane_ids.end(),
               std::uint16_t{0});
+    out.lowest256 = out.lowest_top256;
     const SolidEnd* end = out.many_ends.data();
     for (std::size_t i = 0; i < out.many.size(); i += 2) {
         const std::size_t column = out.many[i];
@@ -95,7 +96,7 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
     }
     hollow[hollow_count] = UINT32_MAX;
 
-    out.lowest256 = INT32_MAX;
+    out.lowest_top256 = INT32_MAX;
     out.highest256 = INT32_MIN;
     const std::uint32_t* next_hollow = hollow;
     for (std::size_t i = 0; i < count; ++i) {
@@ -124,31 +125,28 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
         out.top256[i] = top.y256;
         out.top_id[i] = top.palette_id;
         out.simple_from256[i] = bottom256 + kDistanceMax256;
-        out.lowest256 = std::min(out.lowest256, top.y256);
+        out.lowest_top256 = std::min(out.lowest_top256, top.y256);
         out.highest256 = std::max(out.highest256, top.y256);
     }
     fill_planes(out);
 }
 
-void fill_solid_mask(SolidMask& out, const SolidColumns& columns, std::int32_t y_first,
-                     std::size_t words) {
-    out.y_first = y_first;
-    out.words = words;
+void fill_solid_mask(SolidMask& out, const SolidColumns& columns) {
     out.width = columns.width;
-    out.bits.resize(columns.column_count() * words);
+    out.bits.resize(columns.column_count() * out.words());
+    std::uint64_t* bits = out.bits.data();
     for (std::size_t z = 0; z < columns.width; ++z) {
-        for (std::size_t word = 0; word < words; ++word) {
-            std::uint64_t* const bits = out.bits.data() + (z * words + word) * columns.width;
-            const std::int32_t base = y_first + static_cast<std::int32_t>(word) * 64;
+        for (const std::int32_t y : out.word_y) {
             // The points up to an end are those up to floor(y256 / 256); every further end turns
             // the points under it over, and ends that are not there do so an even number of times.
             for (std::size_t plane = 0; plane < columns.plane_count; ++plane) {
                 const std::int32_t* const ends256 = columns.plane256(plane) + z * columns.width;
                 for (std::size_t x = 0; x < columns.width; ++x) {
-                    const std::uint64_t points = lowest_bits((ends256[x] >> 8) + 1 - base);
+                    const std::uint64_t points = lowest_bits((ends256[x] >> 8) + 1 - y);
                     bits[x] = plane == 0 ? points : bits[x] ^ points;
                 }
             }
+            bits += columns.width;
         }
     }
 }

@@ -48,8 +48,9 @@ struct SolidColumns {
     /// From this height up the nearest end within kDistanceMax256 can only be top256: far below
     /// everything for a column of one end.
     std::vector<std::int32_t> simple_from256;
-    std::int32_t lowest256 = 0;   ///< the lowest end of all
-    std::int32_t highest256 = 0;  ///< the highest end of all
+    std::int32_t lowest256 = 0;      ///< the lowest end of all
+    std::int32_t lowest_top256 = 0;  ///< the lowest of top256
+    std::int32_t highest256 = 0;     ///< the highest end of all
 
     std::size_t column_count() const { return width * width; }
 
@@ -63,37 +64,38 @@ struct SolidColumns {
         return {.y256 = planes256[at], .palette_id = plane_ids[at]};
     }
 
+    /// The columns that have more than one end, and how many: column, count, column, count...
+    std::vector<std::uint32_t> many;
+    std::vector<SolidEnd> many_ends;  ///< their ends, one column behind the other
+
     /// Scratch of find_solid_columns.
     std::vector<std::uint8_t> is_hollow;       ///< by palette id: 1 for void and caves
     std::vector<std::uint32_t> hollow_limits;  ///< the limits that show such a thing
-    std::vector<SolidEnd> many_ends;           ///< of the columns that have more than one, in order
-    std::vector<std::uint32_t> many;           ///< those columns, and how many ends each has
 };
 
 /// Overwrites `out`; allocates only while its buffers grow. Needs: columns of at least one limit.
 void find_solid_columns(SolidColumns& out, const Stack& stack);
 
-/// Bits of lattice points: bit b of word w of a column is point y_first + 64 * w + b. Rows lie as
-/// [z][word][x], so that a step along x is a step in memory. A column of `words` words is filled
-/// whole, however few of the points are wanted.
+/// Bits of lattice points: bit b of word w of a column is point word_y[w] + b. Rows lie as
+/// [z][word][x], so that a step along x is a step in memory.
 struct SolidMask {
-    std::int32_t y_first = 0;  ///< voxels
-    std::size_t words = 0;
+    std::vector<std::int32_t> word_y;  ///< voxels, ascending in steps of 64 or multiples of it
     std::size_t width = 0;
     std::vector<std::uint64_t> bits;
 
+    std::size_t words() const { return word_y.size(); }
+
     const std::uint64_t* row(std::size_t z, std::size_t word) const {
-        return bits.data() + (z * words + word) * width;
+        return bits.data() + (z * words() + word) * width;
     }
 
-    bool is_solid(std::size_t x, std::size_t z, std::int32_t y) const {
-        const auto bit = static_cast<std::size_t>(y - y_first);
-        return ((row(z, bit / 64)[x] >> (bit % 64)) & 1U) != 0;
+    /// True if the word after this one goes on where it ends.
+    bool goes_on(std::size_t word) const {
+        return word + 1 < words() && word_y[word + 1] == word_y[word] + 64;
     }
 };
 
-/// Overwrites `out` with the points [y_first, y_first + 64 * words); allocates only while it grows.
-void fill_solid_mask(SolidMask& out, const SolidColumns& columns, std::int32_t y_first,
-                     std::size_t words);
+/// Overwrites all but `out.word_y`, which says what to fill; allocates only while it grows.
+void fill_solid_mask(SolidMask& out, const SolidColumns& columns);
 
 }  // namespace terrane

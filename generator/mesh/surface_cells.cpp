@@ -6,7 +6,7 @@
 namespace terrane {
 namespace {
 
-void mark_cells(WordGrid& out, const EdgeMasks& edges) {
+void mark_cells(WordGrid& out, const EdgeMasks& edges, const SolidMask& solid) {
     const std::size_t width = edges.upright.width;
     const std::size_t words = edges.upright.words;
     out.reset(width, width - 1, words);
@@ -17,12 +17,13 @@ void mark_cells(WordGrid& out, const EdgeMasks& edges) {
             const Word* const x0 = edges.along_x.row(z, word);
             const Word* const x1 = edges.along_x.row(z + 1, word);
             const Word* const z0 = edges.along_z.row(z, word);
-            // Above the last word nothing is owned; row 0 holds the apron, which is empty.
-            const bool is_last = word + 1 == words;
-            const std::size_t z_above = is_last ? 0 : z;
-            const std::size_t word_above = is_last ? 0 : word + 1;
+            // Where the next word is elsewhere, no edge is just above; row 0 holds the apron, where
+            // none are owned.
+            const bool goes_on = solid.goes_on(word);
+            const std::size_t z_above = goes_on ? z : 0;
+            const std::size_t word_above = goes_on ? word + 1 : 0;
             const Word* const x0_above = edges.along_x.row(z_above, word_above);
-            const Word* const x1_above = edges.along_x.row(is_last ? 0 : z + 1, word_above);
+            const Word* const x1_above = edges.along_x.row(goes_on ? z + 1 : 0, word_above);
             const Word* const z0_above = edges.along_z.row(z_above, word_above);
             Word* const used = out.row(z, word);
             used[width - 1] = 0;
@@ -53,43 +54,71 @@ void number_vertices(Cells& cells) {
     cells.vertex_count = next;
 }
 
-}  // namespace
-
-Word Window::owned(std::size_t word) const {
-    const auto below = [word](std::size_t end) {
-        const std::size_t base = word * 64;
-        return end <= base ? Word{0} : end >= base + 64 ? ~Word{0} : (Word{1} << (end - base)) - 1;
+/// The owned points among the bits of the word at y.
+Word owned_bits(const Window& window, std::int32_t y) {
+    const auto below = [y](std::int32_t end) {
+        const std::int32_t count = end - y;
+        return count <= 0 ? Word{0} : count >= 64 ? ~Word{0} : (Word{1} << count) - 1;
     };
-    return below(points + 1) & ~below(1);
+    return below(window.last_y) & ~below(window.first_y);
 }
 
-/// `range` cut to the heights where anything can cross; no points if there are none.
+}  // namespace
+
 Window window_of(const SolidColumns& columns, HeightRange range) {
     const std::int64_t first = std::max<std::int64_t>(range.first, columns.lowest256 >> 8);
     const std::int64_t last = std::min<std::int64_t>(range.last, (columns.highest256 >> 8) + 1);
     if (first >= last) {
         return {};
     }
-    return {.bit0_y = static_cast<std::int32_t>(first - 1),
-            .points = static_cast<std::size_t>(last - first),
-            .origin256 = static_cast<std::int32_t>((range.first - (first - 1)) * kUnitsPerVoxel)};
+    return {.first_y = static_cast<std::int32_t>(first),
+            .last_y = static_cast<std::int32_t>(last),
+            .origin256 = static_cast<std::int32_t>(range.first * kUnitsPerVoxel)};
+}
+
+void find_words(std::vector<std::int32_t>& out, const SolidColumns& columns, const Window& window) {
+    // Points one below the first owned one to one above the last are looked at.
+    const std::int32_t first_y = window.first_y - 1;
+    const std::int32_t count = (window.last_y + 1 - first_y + 63) / 64;
+    out.assign(static_cast<std::size_t>(count), INT32_MAX);
+    // Columns differ only between their ends: from a cave's floor to its ceiling, and from the
+    // lowest top to the highest. A point more each way makes room for the cells around.
+    const auto mark = [&](std::int32_t low256, std::int32_t high256) {
+        const std::int32_t from = std::max(((low256 >> 8) - 1 - first_y) >> 6, 0);
+        const std::int32_t to = std::min(((high256 >> 8) + 2 - first_y) >> 6, count - 1);
+        for (std::int32_t word = from; word <= to; ++word) {
+            out[static_cast<std::size_t>(word)] = first_y + 64 * word;
+        }
+    };
+    mark(columns.lowest_top256, columns.highest256);
+    const SolidEnd* end = columns.many_ends.data();
+    for (std::size_t i = 0; i < columns.many.size(); i += 2) {
+        const std::size_t ends = columns.many[i + 1];
+        for (std::size_t cave = 0; cave + 1 < ends; cave += 2) {
+            mark(end[cave].y256, end[cave + 1].y256);
+        }
+        end += ends;
+    }
+    std::erase(out, INT32_MAX);
 }
 
 void find_edges(EdgeMasks& out, const SolidMask& solid, const Window& window) {
     const std::size_t width = solid.width;
     const std::size_t side = width - 2;
     for (WordGrid* grid : {&out.upright, &out.along_x, &out.along_z}) {
-        grid->reset(width, width, solid.words);
-        std::fill_n(grid->row(0, 0), width * solid.words, Word{0});
-        std::fill_n(grid->row(side + 1, 0), width * solid.words, Word{0});
+        grid->reset(width, width, solid.words());
+        std::fill_n(grid->row(0, 0), width * solid.words(), Word{0});
+        std::fill_n(grid->row(side + 1, 0), width * solid.words(), Word{0});
     }
     for (std::size_t z = 1; z <= side; ++z) {
-        for (std::size_t word = 0; word < solid.words; ++word) {
-            const Word owned = window.owned(word);
+        for (std::size_t word = 0; word < solid.words(); ++word) {
+            const Word owned = owned_bits(window, solid.word_y[word]);
             const Word* const here = solid.row(z, word);
             const Word* const next_z = solid.row(z + 1, word);
-            // The last word's last bit is never owned, so what is carried into it does not matter.
-            const Word* const above = solid.row(z, std::min(word + 1, solid.words - 1));
+            // Where the next word is elsewhere, nothing changes from this one's last bit upwards.
+            const bool goes_on = solid.goes_on(word);
+            const Word* const above = solid.row(z, goes_on ? word + 1 : word);
+            const int carried = goes_on ? 0 : 63;  // the bit of `above` that is the next
             Word* const upright = out.upright.row(z, word);
             Word* const along_x = out.along_x.row(z, word);
             Word* const along_z = out.along_z.row(z, word);
@@ -98,7 +127,7 @@ void find_edges(EdgeMasks& out, const SolidMask& solid, const Window& window) {
                 grid->row(z, word)[side + 1] = 0;
             }
             for (std::size_t x = 1; x <= side; ++x) {
-                upright[x] = (here[x] ^ (here[x] >> 1 | above[x] << 63)) & owned;
+                upright[x] = (here[x] ^ (here[x] >> 1 | above[x] >> carried << 63)) & owned;
                 along_x[x] = (here[x] ^ here[x + 1]) & owned;
                 along_z[x] = (here[x] ^ next_z[x]) & owned;
             }
@@ -106,8 +135,8 @@ void find_edges(EdgeMasks& out, const SolidMask& solid, const Window& window) {
     }
 }
 
-void find_cells(Cells& out, const EdgeMasks& edges) {
-    mark_cells(out.used, edges);
+void find_cells(Cells& out, const EdgeMasks& edges, const SolidMask& solid) {
+    mark_cells(out.used, edges, solid);
     number_vertices(out);
 }
 

@@ -2,8 +2,8 @@
 // a column at a time.
 //
 // An edge belongs to the tile and height range that hold its first point, so that every quad of the
-// world is made exactly once. Bit 0 of a column is one point below the first owned one: the cell
-// under it is shared with the range below.
+// world is made exactly once. The lowest cells lie one point below the first owned one:
+// they are shared with the range below.
 #pragma once
 
 #include "generator/mesh/solid_mask.h"
@@ -50,29 +50,30 @@ struct Cells {
     std::size_t vertex_count = 0;
 };
 
-/// The heights that edges may start at, and where bit 0 is.
+/// The heights that edges may start at.
 struct Window {
-    std::int32_t bit0_y = 0;     ///< the voxel of bit 0: one below the first owned point
-    std::size_t points = 0;      ///< owned points are bits 1..points
-    std::int32_t origin256 = 0;  ///< where the mesh's y = 0 is, relative to bit 0
+    std::int32_t first_y = 0;  ///< voxels; owned points are first_y <= y < last_y
+    std::int32_t last_y = 0;
+    std::int32_t origin256 = 0;  ///< where the mesh's y = 0 is
 
-    /// Words a column needs: the owned points and one more at either end.
-    std::size_t words() const { return (points + 2 + 63) / 64; }
-
-    /// The owned points among a word's bits.
-    Word owned(std::size_t word) const;
+    bool is_empty() const { return first_y >= last_y; }
 };
 
-/// `range` cut to the heights where anything can cross; no points if there are none.
+/// `range` cut to the heights where anything can cross; empty if there are none.
 Window window_of(const SolidColumns& columns, HeightRange range);
 
-/// Overwrites `out`. Needs: `solid` holds the window's points from bit 0 on.
+/// Overwrites `out` with the words in which columns of the window may differ from one another or
+/// from themselves a voxel higher, in steps of 64 voxels from one under the window: stacks are
+/// solid through and through for most of their height.
+void find_words(std::vector<std::int32_t>& out, const SolidColumns& columns, const Window& window);
+
+/// Overwrites `out`.
 void find_edges(EdgeMasks& out, const SolidMask& solid, const Window& window);
 
 /// Marks the cells around every owned edge: four beside an upright one, and beside a level one two
 /// with their floor and two with their ceiling at its height. Numbers their vertices cell column by
 /// cell column, upwards in each.
-void find_cells(Cells& out, const EdgeMasks& edges);
+void find_cells(Cells& out, const EdgeMasks& edges, const SolidMask& solid);
 
 std::size_t count_edges(const EdgeMasks& edges);
 

@@ -197,7 +197,7 @@ struct CellPlaces {
 
 /// One vertex for every used cell, at its number; its position in `packed` too.
 void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexMaker& maker,
-                   const Cells& cells, const Window& window) {
+                   const Cells& cells, const SolidMask& solid, const Window& window) {
     const std::size_t width = cells.used.width;
     const std::size_t last = width - 2;
     const CellPlaces places(last);
@@ -205,7 +205,6 @@ void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexM
     for (std::size_t z = 0; z <= last; ++z) {
         for (std::size_t word = 0; word < cells.used.words; ++word) {
             list.read(cells.used.row(z, word), 0, last);
-            const std::int32_t word_y = static_cast<std::int32_t>(word) * 64;
             const std::uint32_t* const first_vertex =
                 cells.first_vertex.data() + (cells.used.row(z, word) - cells.used.bits.data());
             std::size_t x_before = width;
@@ -213,10 +212,9 @@ void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexM
             for (const auto [x, bit] : list.places()) {
                 at = x == x_before ? at + 1 : first_vertex[x];
                 x_before = x;
-                const std::int32_t y = word_y + bit;
-                const auto [vertex, shade] =
-                    maker.at(z * width + x, (window.bit0_y + y) * kUnitsPerVoxel);
-                const Lanes base = {places.base256[x], y * kUnitsPerVoxel - window.origin256,
+                const std::int32_t floor256 = (solid.word_y[word] + bit) * kUnitsPerVoxel;
+                const auto [vertex, shade] = maker.at(z * width + x, floor256);
+                const Lanes base = {places.base256[x], floor256 - window.origin256,
                                     places.base256[z], 0};
                 const Lanes keeps = {places.keeps[x], -1, places.keeps[z], 0};
                 const Lanes position = base + (vertex.offset256 & keeps);
@@ -280,7 +278,7 @@ void find_triangles(Mesh& out, const std::vector<PackedPosition>& packed, const 
     BitList list;
     const std::size_t side = solid.width - 2;
     for (std::size_t z = 1; z <= side; ++z) {
-        for (std::size_t word = 0; word < solid.words; ++word) {
+        for (std::size_t word = 0; word < solid.words(); ++word) {
             const CellRow before(cells, z - 1, word);
             const CellRow here(cells, z, word);
             const auto starts_solid = [row = solid.row(z, word)](BitList::Place at) {
@@ -333,13 +331,14 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     Buffers& b = *buffers_;
     find_solid_columns(b.columns, stack);
     const Window window = window_of(b.columns, heights);
-    if (window.points == 0) {
+    if (window.is_empty()) {
         out.clear();
         return;
     }
-    fill_solid_mask(b.solid, b.columns, window.bit0_y, window.words());
+    find_words(b.solid.word_y, b.columns, window);
+    fill_solid_mask(b.solid, b.columns);
     find_edges(b.edges, b.solid, window);
-    find_cells(b.cells, b.edges);
+    find_cells(b.cells, b.edges, b.solid);
     find_palette_shades(b.shades, stack.palette, b.material_colors);
 
     const std::size_t vertices = b.cells.vertex_count;
@@ -349,7 +348,7 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     out.material_ids.resize(vertices);
     out.indices.resize(6 * count_edges(b.edges));
     b.packed.resize(vertices);
-    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades), b.cells, window);
+    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades), b.cells, b.solid, window);
     find_triangles(out, b.packed, b.solid, b.edges, b.cells);
 }
 

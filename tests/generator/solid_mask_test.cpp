@@ -52,13 +52,10 @@ TEST(SolidMask, TakesTheTopButNotTheBottomOfAnInterval) {
     SolidColumns columns;
     find_solid_columns(columns, stack);
     SolidMask mask;
-    fill_solid_mask(mask, columns, -2, 1);
+    mask.word_y = {-2};
+    fill_solid_mask(mask, columns);
     // Solid: all up to 1, and 3; the points at 1 and 3 are tops, the one at 2 is a bottom.
     EXPECT_EQ(mask.row(2, 0)[3], 0b101111U);
-    EXPECT_TRUE(mask.is_solid(3, 2, 1));
-    EXPECT_FALSE(mask.is_solid(3, 2, 2));
-    EXPECT_TRUE(mask.is_solid(3, 2, 3));
-    EXPECT_FALSE(mask.is_solid(3, 2, 4));
 }
 
 TEST(SolidMask, AgreesWithTheLimitsAtEveryPointOfTallColumns) {
@@ -81,9 +78,14 @@ TEST(SolidMask, AgreesWithTheLimitsAtEveryPointOfTallColumns) {
         SolidColumns columns;
         find_solid_columns(columns, stack);
         SolidMask mask;
-        const auto y_first = static_cast<std::int32_t>(random() % 40) - 20;
-        fill_solid_mask(mask, columns, y_first, 4);
-        for (std::int32_t y = y_first; y < y_first + 4 * 64; ++y) {
+        const auto first_y = static_cast<std::int32_t>(random() % 40) - 20;
+        mask.word_y = {first_y, first_y + 64, first_y + 192};  // the third of four is left out
+        fill_solid_mask(mask, columns);
+        EXPECT_TRUE(mask.goes_on(0));
+        EXPECT_FALSE(mask.goes_on(1));
+        EXPECT_FALSE(mask.goes_on(2));
+        for (std::size_t bit = 0; bit < 3 * 64; ++bit) {
+            const std::int32_t y = mask.word_y[bit / 64] + static_cast<std::int32_t>(bit % 64);
             const auto limits = stack.columns.column(2, 3);
             bool expected = y * 256 <= limits.front().y256;
             for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
@@ -91,7 +93,8 @@ TEST(SolidMask, AgreesWithTheLimitsAtEveryPointOfTallColumns) {
                     expected = stack.palette[limits[i].palette_id].is_solid();
                 }
             }
-            EXPECT_EQ(mask.is_solid(3, 4, y), expected) << "y " << y << ", round " << round;
+            const bool is_solid = (mask.row(4, bit / 64)[3] >> (bit % 64) & 1U) != 0;
+            EXPECT_EQ(is_solid, expected) << "y " << y << ", round " << round;
         }
     }
 }

@@ -296,7 +296,7 @@ TEST_P(SurfaceNetsOf, EveryVertexIsTheMeanOfItsCrossings) {
     std::int64_t checked = 0;
     for (std::uint64_t seed = 0; seed < 3; ++seed) {
         const Stack drawn = stack({.lod = 0, .x = -3, .z = 2}, 12, seed);
-        const Mesh mesh = mesh_of(letters_, drawn, {.first = 0, .last = 300});
+        const Mesh mesh = mesh_of(letters_, drawn, {.first = 0, .last = 1000});
         for (const glm::i32vec3& position : mesh.positions256) {
             const glm::i32vec3 cell = {floor_div(position.x - 128, 256), floor_div(position.y, 256),
                                        floor_div(position.z - 128, 256)};
@@ -323,7 +323,7 @@ TEST_P(SurfaceNetsOf, NeighboursMeetWithoutCracksSidewaysAndUpwards) {
         for (std::int32_t z = -2; z <= 1; ++z) {
             for (std::int32_t x = -2; x <= 1; ++x) {
                 const Stack drawn = stack({.lod = 0, .x = x, .z = z}, kSide, 11);
-                for (std::int32_t y = -1; y * height < 130; ++y) {
+                for (std::int32_t y = -1; y * height < 930; ++y) {
                     mesher.mesh(mesh, drawn, y, height);
                     audit.add(mesh, {.lod = 0, .x = x, .y = y, .z = z});
                 }
@@ -352,9 +352,10 @@ TEST_P(SurfaceNetsOf, AllHeightsAtOnceAreTheChunksTogether) {
         return triangles;
     };
     const Stack drawn = stack({}, 9, 4);
-    const auto whole = triangles_of(mesh_of(letters_, drawn, {.first = -7, .last = 200}), -7 * 256);
+    const auto whole =
+        triangles_of(mesh_of(letters_, drawn, {.first = -7, .last = 1000}), -7 * 256);
     std::multiset<Triangle> parts;
-    for (std::int32_t y = 0; y < 200; y += 10) {
+    for (std::int32_t y = 0; y < 1000; y += 10) {
         parts.merge(triangles_of(mesh_of(letters_, drawn, {.first = y, .last = y + 10}), y * 256));
     }
     EXPECT_GT(whole.size(), 100U);
@@ -364,25 +365,27 @@ TEST_P(SurfaceNetsOf, AllHeightsAtOnceAreTheChunksTogether) {
 TEST_P(SurfaceNetsOf, EveryVertexIsUsedAndWhatTheMesherDidBeforeDoesNotMatter) {
     SurfaceNetsMesher mesher(letters_.definition());
     Mesh mesh;
-    mesher.mesh(mesh, stack({.lod = 0, .x = 9, .z = 9}, 16, 1), {.first = 0, .last = 200});
+    mesher.mesh(mesh, stack({.lod = 0, .x = 9, .z = 9}, 16, 1), {.first = 0, .last = 1000});
     const Stack drawn = stack({.lod = 0, .x = 5, .z = 0}, 8, 2);
-    mesher.mesh(mesh, drawn, {.first = 3, .last = 20});
-    const Mesh fresh = mesh_of(letters_, drawn, {.first = 3, .last = 20});
+    mesher.mesh(mesh, drawn, {.first = 3, .last = 60});
+    const Mesh fresh = mesh_of(letters_, drawn, {.first = 3, .last = 60});
     EXPECT_EQ(mesh.positions256, fresh.positions256);
     EXPECT_EQ(mesh.normals, fresh.normals);
     EXPECT_EQ(mesh.colors, fresh.colors);
     EXPECT_EQ(mesh.material_ids, fresh.material_ids);
     EXPECT_EQ(mesh.indices, fresh.indices);
+    ASSERT_GT(mesh.vertex_count(), 0U);
     const std::set<std::uint32_t> used(mesh.indices.begin(), mesh.indices.end());
     EXPECT_EQ(used.size(), mesh.vertex_count());
     EXPECT_EQ(*used.rbegin(), mesh.vertex_count() - 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Worlds, SurfaceNetsOf, testing::Values(&hills, &caves, &rubble),
+INSTANTIATE_TEST_SUITE_P(Worlds, SurfaceNetsOf, testing::Values(&hills, &caves, &rubble, &depths),
                          [](const auto& world) {
-                             return world.param == &hills   ? "Hills"
-                                    : world.param == &caves ? "Caves"
-                                                            : "Rubble";
+                             return world.param == &hills    ? "Hills"
+                                    : world.param == &caves  ? "Caves"
+                                    : world.param == &rubble ? "Rubble"
+                                                             : "Depths";
                          });
 
 }  // namespace

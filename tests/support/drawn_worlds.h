@@ -85,4 +85,25 @@ inline std::vector<Limit> rubble(const Letters& letters, std::uint64_t seed, Col
     return column;
 }
 
+/// High and mostly solid: rough ground far up, a low cave of high walls, and shafts far apart.
+inline std::vector<Limit> depths(const Letters& letters, std::uint64_t seed, ColumnPos at) {
+    const auto limit = [&letters](std::int32_t y256, char letter) {
+        return Limit{.y256 = y256, .palette_id = letters.id(letter), .flow = {}};
+    };
+    std::vector<Limit> column = {limit(0, 'a')};
+    const auto add_cave = [&](std::int32_t floor256, std::int32_t ceiling256) {
+        if (floor256 < ceiling256) {
+            column.insert(column.end(), {limit(floor256, 'a'), limit(floor256, 'o'),
+                                         limit(ceiling256, 'o'), limit(ceiling256, 'a')});
+        }
+    };
+    const std::int32_t low = drawn_smoothly(seed, at, 90 * 256);
+    add_cave(30 * 256 + low / 3, 30 * 256 + low);
+    const bool is_shaft = drawn(seed, floor_div(at.x, 3), floor_div(at.z, 3), 4) == 0;
+    add_cave(400 * 256 + drawn(seed + 1, at.x, at.z, 512), is_shaft ? 500 * 256 + low : 0);
+    const std::int32_t top = 900 * 256 + drawn(seed + 2, at.x, at.z, 8 * 256);
+    column.insert(column.end(), {limit(top, 'a'), limit(top, '.')});
+    return column;
+}
+
 }  // namespace terrane
