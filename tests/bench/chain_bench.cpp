@@ -1,6 +1,7 @@
 // A cold mesh, whole and stage by stage, against Draco's encoding alone; and two workers against
 // one.
 #include "generator/mesh/draco_codec.h"
+#include "generator/mesh/height_field.h"
 #include "generator/mesh/surface_nets.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/world.h"
@@ -103,6 +104,22 @@ void cold_whole(benchmark::State& state) {
     }
 }
 
+/// A coarse level's tile: generate, height field with skirts, encode.
+void cold_level(benchmark::State& state) {
+    Chain chain;
+    HeightFieldMesher mesher(chain.world->definition);
+    std::int32_t i = 0;
+    for (auto _ : state) {
+        const StackPos position{.lod = static_cast<std::int32_t>(state.range(0)),
+                                .x = i % 256 - 128,
+                                .z = i / 256 % 256};
+        benchmark::DoNotOptimize(chain.generator.generate(chain.stack, position));
+        mesher.mesh(chain.mesh, chain.stack, true);
+        benchmark::DoNotOptimize(chain.encode());
+        ++i;
+    }
+}
+
 /// `workers` threads, each with a chain of its own, share 64 stacks.
 void workers_whole(benchmark::State& state) {
     const auto workers = static_cast<std::int64_t>(state.range(0));
@@ -129,12 +146,25 @@ BENCHMARK(cold_generate)->Unit(benchmark::kMicrosecond);
 BENCHMARK(cold_mesh)->Unit(benchmark::kMicrosecond);
 BENCHMARK(cold_encode)->Unit(benchmark::kMicrosecond);
 BENCHMARK(cold_whole)->Unit(benchmark::kMicrosecond);
+BENCHMARK(cold_level)->Arg(1)->Arg(3)->Arg(5)->Arg(9)->Arg(17)->Unit(benchmark::kMicrosecond);
 BENCHMARK(workers_whole)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 const RatioEntry kWhole{{.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone",
                          .numerators = {"cold_whole"},
                          .denominator = "cold_encode",
                          .bar = 1.4}};
+const RatioEntry kLevelsOf[] = {RatioEntry{{.what = "whole cold mesh of level 1 / of level 0",
+                                            .numerators = {"cold_level/1"},
+                                            .denominator = "cold_whole",
+                                            .bar = 1.3}},
+                                RatioEntry{{.what = "whole cold mesh of level 5 / of level 0",
+                                            .numerators = {"cold_level/5"},
+                                            .denominator = "cold_whole",
+                                            .bar = 1.3}},
+                                RatioEntry{{.what = "whole cold mesh of level 17 / of level 0",
+                                            .numerators = {"cold_level/17"},
+                                            .denominator = "cold_whole",
+                                            .bar = 1.3}}};
 const RatioEntry kMesh{{.what = "mesh / its Draco encode",
                         .numerators = {"cold_mesh"},
                         .denominator = "cold_encode",

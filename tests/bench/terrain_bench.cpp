@@ -79,6 +79,45 @@ void extend(benchmark::State& state, const std::string& name) {
         static_cast<double>(limits) / static_cast<double>(state.iterations());
 }
 
+/// A game's world: 12 layers, 4 octaves, 256 voxels high, 32^3 chunks.
+std::shared_ptr<const World> high_world(double density) {
+    WorldDefinition definition = bench_world("paper-B3")->definition;
+    definition.name = "high";
+    definition.grid = {.side = 32, .height = 32, .plot = 160, .voxel_size_m = 1};
+    TerrainParameters& terrain = definition.terrain;
+    terrain.depth = 220;
+    terrain.scale = 90;
+    terrain.octaves = 4;
+    terrain.vein_area = terrain.cave_area = 60;
+    terrain.vein_density = terrain.cave_density = density;
+    for (terrain.layer_thickness = 20;; terrain.layer_thickness += 0.5) {
+        auto world = World::build(definition);
+        if (world && world->stack.layers.size() <= 12) {
+            return std::make_shared<const World>(std::move(*world));
+        }
+    }
+}
+
+constexpr std::int64_t kStackVoxels = std::int64_t{32} * 32 * 256;
+
+/// Chunk stacks to limits, apron included; `items` are voxels.
+void stack_limits(benchmark::State& state, double density, std::int32_t lod) {
+    const auto world = high_world(density);
+    StackGenerator generator(*world);
+    Stack stack;
+    std::int32_t i = 0;
+    for (auto _ : state) {
+        if (!generator.generate(stack, {.lod = lod, .x = i % 1024 - 512, .z = i / 1024})) {
+            state.SkipWithError("out of range");
+            break;
+        }
+        ++i;
+        benchmark::DoNotOptimize(stack.columns.limits.data());
+    }
+    state.SetItemsProcessed(state.iterations() * kStackVoxels);
+    state.counters["layers"] = static_cast<double>(world->stack.layers.size());
+}
+
 void noise_scalar(benchmark::State& state) {
     const Noise noise = Noise::make(key(1, Tag::noise, 0), static_cast<double>(state.range(0)), 1);
     std::int64_t z = 0;
@@ -113,6 +152,15 @@ void register_all() {
             (std::string("extend/") + name).c_str(),
             [name](benchmark::State& state) { extend(state, std::string("paper-") + name); });
     }
+    for (const std::int32_t lod : {0, 1, 3, 5, 9, 17}) {
+        for (const double density : {0.0, 0.25}) {
+            const std::string name =
+                "stack_limits/level" + std::to_string(lod) + (density > 0 ? "/elements" : "/plain");
+            benchmark::RegisterBenchmark(name.c_str(), [density, lod](benchmark::State& state) {
+                stack_limits(state, density, lod);
+            });
+        }
+    }
     benchmark::RegisterBenchmark("noise_scalar", noise_scalar)->Arg(28);
     for (const KernelSet& set : available_kernel_sets()) {
         benchmark::RegisterBenchmark(
@@ -129,6 +177,30 @@ const RatioEntry kExtend{{.what = "extend the paper's B3 online / per-voxel Perl
                           .numerators = {"extend/B3"},
                           .denominator = "perlin_per_voxel",
                           .bar = 0.06}};
+const RatioEntry kExtendMean{
+    {.what = "extend the paper's terrain online, mean of the eight / per-voxel Perlin",
+     .numerators = {"extend/A0", "extend/A1", "extend/A2", "extend/A3", "extend/B0", "extend/B1",
+                    "extend/B2", "extend/B3"},
+     .denominator = "perlin_per_voxel",
+     .bar = 0.03}};
+const RatioEntry kStackPlain{
+    {.what = "stack to limits, 12 layers, 256 high, no elements / per-voxel Perlin",
+     .numerators = {"stack_limits/level0/plain"},
+     .denominator = "perlin_per_voxel",
+     .bar = 0.014}};
+const RatioEntry kStackElements{
+    {.what = "the same with vein and cave density 0.25 / per-voxel Perlin",
+     .numerators = {"stack_limits/level0/elements"},
+     .denominator = "perlin_per_voxel",
+     .bar = 0.028}};
+const RatioEntry kLevelFive{{.what = "generate a level-5 stack / a level-0 stack",
+                             .numerators = {"stack_limits/level5/elements"},
+                             .denominator = "stack_limits/level0/elements",
+                             .bar = 3}};
+const RatioEntry kLevelLast{{.what = "generate a level-17 stack / a level-0 stack",
+                             .numerators = {"stack_limits/level17/elements"},
+                             .denominator = "stack_limits/level0/elements",
+                             .bar = 3}};
 const RatioEntry kNoise{{.what = "noise, rows of 64, AVX2, period 28 / scalar twin",
                          .numerators = {"noise_rows/avx2/28"},
                          .denominator = "noise_scalar/28",
