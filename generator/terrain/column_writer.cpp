@@ -253,13 +253,15 @@ class RowWriter {
     const std::uint8_t* irregular_ = nullptr;
 };
 
-/// The highest limit of the inner columns: what is void above it is void for ever.
-std::int32_t highest_limit(const ColumnGrid& grid, std::int32_t apron) {
+/// The highest limit of the inner columns: the last layer's top, since no layer lies below what it
+/// rests on. What is void above it is void for ever.
+std::int32_t highest_limit(const Region& region, std::size_t layers) {
     std::int32_t highest = 0;
-    for (std::int32_t z = 0; z < grid.length - 2 * apron; ++z) {
-        for (std::int32_t x = 0; x < grid.width - 2 * apron; ++x) {
-            const std::uint32_t end = grid.offsets[grid.index_of(x, z) + 1];
-            highest = std::max(highest, grid.limits[end - 1].y256);
+    for (std::int32_t z = 1; z <= region.inner.length; ++z) {
+        const std::int32_t* const row = region.y256.data() + (layers - 1) * region.plane_size() +
+                                        static_cast<std::ptrdiff_t>(z) * region.shape.stride() + 1;
+        for (std::int32_t x = 0; x < region.inner.width; ++x) {
+            highest = std::max(highest, row[x]);
         }
     }
     return highest;
@@ -303,7 +305,7 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
         used = static_cast<std::size_t>(at - base);
     }
     grid.limits.resize(used);
-    out.highest_y256 = highest_limit(grid, apron);
+    out.highest_y256 = highest_limit(region, constants.rules.size());
     number_elements(out, region, world);
 }
 

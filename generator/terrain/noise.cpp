@@ -45,19 +45,27 @@ float fade(float t) {
     return t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F);
 }
 
+__extension__ using Wide = __int128;
+
 struct LatticePosition {
     std::int64_t cell = 0;
     float fraction = 0;  ///< 24 bits, [0, 1)
 };
 
-LatticePosition lattice_position(std::int64_t coordinate, std::uint64_t frequency,
-                                 std::uint64_t offset) {
-    __extension__ using Wide = __int128;
-    const Wide position =
-        static_cast<Wide>(coordinate) * static_cast<Wide>(frequency) + static_cast<Wide>(offset);
+/// 64.64 fixed point, in lattice cells.
+Wide fixed_point(std::int64_t coordinate, std::uint64_t frequency, std::uint64_t offset) {
+    return static_cast<Wide>(coordinate) * static_cast<Wide>(frequency) + static_cast<Wide>(offset);
+}
+
+LatticePosition split(Wide position) {
     const auto low = static_cast<std::uint64_t>(position);
     return {.cell = static_cast<std::int64_t>(position >> 64),
             .fraction = static_cast<float>(static_cast<std::uint32_t>(low >> 40U)) * 0x1p-24F};
+}
+
+LatticePosition lattice_position(std::int64_t coordinate, std::uint64_t frequency,
+                                 std::uint64_t offset) {
+    return split(fixed_point(coordinate, frequency, offset));
 }
 
 float octave_at(const NoiseOctave& octave, std::int64_t x, std::int64_t z) {
@@ -126,7 +134,8 @@ class LatticeLines {
   public:
     LatticeLines(std::int64_t first, std::int64_t step, std::uint64_t frequency,
                  std::uint64_t offset)
-        : coordinate_(first), step_(step), frequency_(frequency), offset_(offset) {}
+        : position_(fixed_point(first, frequency, offset)),
+          step_(fixed_point(step, frequency, 0)) {}
 
     struct Next {
         float fraction = 0;
@@ -136,8 +145,8 @@ class LatticeLines {
     };
 
     Next next() {
-        const LatticePosition position = lattice_position(coordinate_, frequency_, offset_);
-        coordinate_ += step_;
+        const LatticePosition position = split(position_);
+        position_ += step_;
         Next next{.fraction = position.fraction, .cell = position.cell};
         if (count_ > 0 && position.cell == last_cell_) {
             next.new_lines = 0;
@@ -155,10 +164,8 @@ class LatticeLines {
     std::int32_t count() const { return count_; }
 
   private:
-    std::int64_t coordinate_;
-    std::int64_t step_;
-    std::uint64_t frequency_;
-    std::uint64_t offset_;
+    Wide position_;
+    Wide step_;
     std::int64_t last_cell_ = 0;
     std::int32_t count_ = 0;
 };

@@ -10,6 +10,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -26,10 +27,9 @@ struct Chain {
     std::shared_ptr<const World> world = bench_world(kWorld);
     StackGenerator generator{*world};
     SurfaceNetsMesher mesher{world->definition};
-    HeightRange heights{.first = 0,
-                        .last = static_cast<std::int64_t>(world->stack.height_bound) + 2};
-    DracoSettings settings{.side = world->definition.grid.side,
-                           .height_voxels = static_cast<std::int32_t>(heights.last) + 1};
+    DracoSettings settings{
+        .side = world->definition.grid.side,
+        .height_voxels = static_cast<std::int32_t>(world->stack.height_bound) + 3};
     Stack stack;
     Mesh mesh;
 
@@ -40,7 +40,17 @@ struct Chain {
         return generator.generate(stack, position).has_value();
     }
 
-    void make_mesh() { mesher.mesh(mesh, stack, heights); }
+    void make_mesh() { mesher.mesh(mesh, stack, heights_of(stack)); }
+
+    /// Every surface there is, those towards the apron too.
+    static HeightRange heights_of(const Stack& stack) {
+        std::int32_t highest = 0;
+        const ColumnGrid& columns = stack.columns;
+        for (std::size_t i = 1; i < columns.offsets.size(); ++i) {
+            highest = std::max(highest, columns.limits[columns.offsets[i] - 1].y256);
+        }
+        return {.first = 0, .last = highest / kUnitsPerVoxel + 2};
+    }
 
     std::size_t encode() const {
         const auto bytes = encode_draco(mesh, settings);
@@ -77,8 +87,8 @@ void cold_mesh(benchmark::State& state) {
     std::size_t i = 0;
     std::size_t triangles = 0;
     for (auto _ : state) {
-        prepared.chain.mesher.mesh(prepared.chain.mesh, prepared.stacks[i++ % 16],
-                                   prepared.chain.heights);
+        const Stack& stack = prepared.stacks[i++ % 16];
+        prepared.chain.mesher.mesh(prepared.chain.mesh, stack, Chain::heights_of(stack));
         triangles += prepared.chain.mesh.triangle_count();
     }
     state.counters["triangles"] =
