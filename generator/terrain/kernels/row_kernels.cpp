@@ -107,8 +107,11 @@ void noise(float* out, std::int32_t stride, std::int32_t width, std::int32_t len
     LatticeRow lattice;
     float zeros[kRectangleSideMax + 2 * kBlock];
     float sums[2][kRectangleSideMax + 2 * kBlock];
+    // Cleared, since blocks run over into columns that no octave has: those stay harmless numbers.
     for (std::int32_t i = 0; i < kRectangleSideMax + 2 * kBlock; ++i) {
         zeros[i] = 0;
+        sums[0][i] = 0;
+        sums[1][i] = 0;
     }
     for (std::int32_t row = 0; row < length; ++row) {
         float* const result = out + row * stride;
