@@ -39,21 +39,6 @@ double share_of(const Composition& composition, std::uint16_t material) {
     return sum;
 }
 
-/// The material with the largest share of (1 - t) * low + t * high; the first of equals.
-std::uint8_t main_material(const Composition& low, const Composition& high, double t) {
-    Share main;
-    for (const Composition* composition : {&low, &high}) {
-        for (const Share& share : composition->shares()) {
-            const double amount =
-                share_of(low, share.material) * (1.0 - t) + share_of(high, share.material) * t;
-            if (amount > main.concentration) {
-                main = {.material = share.material, .concentration = amount};
-            }
-        }
-    }
-    return static_cast<std::uint8_t>(main.material);
-}
-
 }  // namespace
 
 LinearColor linear_color_of(Rgb8 srgb) {
@@ -69,6 +54,28 @@ std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition) {
         colors.push_back(linear_color_of(material.color));
     }
     return colors;
+}
+
+std::vector<Shade> material_shades_of(const WorldDefinition& definition) {
+    std::vector<Shade> shades;
+    for (const LinearColor& color : linear_colors_of(definition)) {
+        shades.push_back(rounded(color, static_cast<std::uint8_t>(shades.size())));
+    }
+    return shades;
+}
+
+std::uint8_t main_material(const Composition& low, const Composition& high, double t) {
+    Share main;
+    for (const Composition* composition : {&low, &high}) {
+        for (const Share& share : composition->shares()) {
+            const double amount =
+                share_of(low, share.material) * (1.0 - t) + share_of(high, share.material) * t;
+            if (amount > main.concentration) {
+                main = {.material = share.material, .concentration = amount};
+            }
+        }
+    }
+    return static_cast<std::uint8_t>(main.material);
 }
 
 void find_palette_shades(std::vector<PaletteShade>& out, const Palette& palette,

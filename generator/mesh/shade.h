@@ -27,6 +27,12 @@ LinearColor linear_color_of(Rgb8 srgb);
 /// The definition's material colours in linear light, by material index.
 std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition);
 
+/// Every material's own colour and index, by material index.
+std::vector<Shade> material_shades_of(const WorldDefinition& definition);
+
+/// The material with the largest share of (1 - t) * low + t * high; the first of equals.
+std::uint8_t main_material(const Composition& low, const Composition& high, double t);
+
 /// A palette entry's colour before and after rounding.
 struct PaletteShade {
     LinearColor color;
