@@ -59,8 +59,8 @@ Result<ChunkContent> read_chunk(const ChunkAnswer& answer, std::span<const std::
     if (answer.status != ChunkStatus::full) {
         return ChunkContent{};
     }
-    return answer.format == ChunkFormat::draco ? read_mesh(payload)
-                                               : read_columns(answer, payload, world);
+    return answer.format == ChunkFormat::columns ? read_columns(answer, payload, world)
+                                                 : read_mesh(payload);
 }
 
 }  // namespace terrane

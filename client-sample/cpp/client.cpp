@@ -91,10 +91,11 @@ class Client::Session {
 };
 
 Result<void> Client::Session::greet(const ClientOptions& options, Deadline deadline) {
-    const ClientHello greeting{.protocol_version = kProtocolVersion,
-                               .client_name = options.client_name,
-                               .token = options.token,
-                               .formats = {ChunkFormat::draco, ChunkFormat::columns}};
+    const ClientHello greeting{
+        .protocol_version = kProtocolVersion,
+        .client_name = options.client_name,
+        .token = options.token,
+        .formats = {ChunkFormat::draco, ChunkFormat::columns, ChunkFormat::draco_blocky}};
     if (const auto sent = send(greeting); !sent) {
         return sent;
     }

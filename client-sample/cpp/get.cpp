@@ -30,13 +30,17 @@ std::string file_stem(ChunkPos key) {
            "_" + std::to_string(key.z);
 }
 
+std::string_view extension_of(ChunkFormat format) {
+    return format == ChunkFormat::draco_blocky ? "blocky.draco" : to_string(format);
+}
+
 /// Where payloads and OBJ files go.
 struct Places {
     std::filesystem::path output;  ///< empty: payloads are not written
     bool is_folder = false;
 
     std::filesystem::path payload_of(ChunkPos key, ChunkFormat format) const {
-        return is_folder ? output / (file_stem(key) + "." + std::string(to_string(format)))
+        return is_folder ? output / (file_stem(key) + "." + std::string(extension_of(format)))
                          : output;
     }
 
@@ -234,6 +238,14 @@ struct GetFlags {
     GetOptions options;
 };
 
+ChunkFormat format_named(std::string_view name) {
+    if (name == to_string(ChunkFormat::draco)) {
+        return ChunkFormat::draco;
+    }
+    return name == to_string(ChunkFormat::columns) ? ChunkFormat::columns
+                                                   : ChunkFormat::draco_blocky;
+}
+
 Result<GetOptions> understood(const GetFlags& flags) {
     GetOptions options = flags.options;
     const auto address = parse_address(flags.server);
@@ -251,9 +263,10 @@ Result<GetOptions> understood(const GetFlags& flags) {
             options.keys.push_back(*chunk);
         }
     }
-    options.format = flags.format == "draco" ? ChunkFormat::draco : ChunkFormat::columns;
-    if (options.obj && options.format != ChunkFormat::draco) {
-        return fail(ErrorCode::invalid_argument, "--obj: columns have no mesh; use --format draco");
+    options.format = format_named(flags.format);
+    if (options.obj && options.format == ChunkFormat::columns) {
+        return fail(ErrorCode::invalid_argument,
+                    "--obj: columns have no mesh; use --format draco or blocky");
     }
     // Not CLI::Range, which lets NaN pass.
     if (!(options.timeout_s >= kTimeoutMinS && options.timeout_s <= kTimeoutMaxS)) {
@@ -281,12 +294,14 @@ void add_get_command(CLI::App& app, int& exit_code) {
     get->add_option("--lod", flags->lod, "Level of detail: every 2^L-th column")
         ->type_name("L")
         ->capture_default_str();
-    get->add_option("--format", flags->format, "draco: a mesh; columns: the limits it is made of")
-        ->check(CLI::IsMember({"draco", "columns"}))
+    get->add_option("--format", flags->format,
+                    "draco: a smooth mesh; blocky: a mesh of blocks, level 0 only; columns: the "
+                    "limits that both are made of")
+        ->check(CLI::IsMember({"draco", "blocky", "columns"}))
         ->capture_default_str();
-    get->add_option(
-           "-o,--output", flags->output,
-           "Write the payload to this file; several go to this folder as LOD_X_Y_Z.draco|columns")
+    get->add_option("-o,--output", flags->output,
+                    "Write the payload to this file; several go to this folder as "
+                    "LOD_X_Y_Z.draco|blocky.draco|columns")
         ->type_name("FILE|DIR");
     get->add_flag("--obj", flags->options.obj,
                   "Write the mesh beside it as Wavefront OBJ, in world metres");

@@ -10,6 +10,8 @@ std::string_view to_string(ChunkFormat format) {
             return "draco";
         case ChunkFormat::columns:
             return "columns";
+        case ChunkFormat::draco_blocky:
+            return "blocky";
     }
     return "unknown";
 }

@@ -21,11 +21,11 @@
 
 namespace terrane {
 
-enum class ChunkFormat : std::uint8_t { draco = 0, columns = 1 };
+enum class ChunkFormat : std::uint8_t { draco = 0, columns = 1, draco_blocky = 2 };
 enum class ChunkStatus : std::uint8_t { full = 0, empty = 1, uniform = 2, not_modified = 3 };
 enum class ChunkSource : std::uint8_t { generated = 0, store = 1, cache = 2 };
 
-/// As on the command line and in JSON, e.g. "draco", "not_modified", "generated".
+/// As on the command line and in JSON, e.g. "draco", "blocky", "not_modified", "generated".
 std::string_view to_string(ChunkFormat format);
 std::string_view to_string(ChunkStatus status);
 std::string_view to_string(ChunkSource source);

@@ -20,7 +20,7 @@ namespace terrane {
 
 /// A chunk as it is sent. A function of (world, key) only, so it may be kept for ever.
 struct EncodedChunk {
-    ChunkStatus status = ChunkStatus::empty;  ///< full, empty (draco only) or uniform
+    ChunkStatus status = ChunkStatus::empty;  ///< full, empty (meshes only) or uniform
     Composition uniform;                      ///< what it consists of, if `uniform`
     Hash128 etag;         ///< XXH3-128 of the payload if `full`, else of status and composition
     SharedBytes payload;  ///< null unless `full`

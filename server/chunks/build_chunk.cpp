@@ -57,6 +57,7 @@ ChunkBuilder::ChunkBuilder(const BuildContext& context)
     : context_(context),
       generator_(*context.world),
       mesher_(context.world->definition),
+      blocky_mesher_(context.world->definition),
       tile_mesher_(context.world->definition),
       tile_height_voxels_(static_cast<std::int32_t>(context.world->stack.height_bound) + 2) {}
 
@@ -69,7 +70,7 @@ Result<Answer> ChunkBuilder::build(const Task& task) {
 
 Result<Answer> ChunkBuilder::build_chunk(const Task& task, const ChunkKey& key) {
     ServedChunk answer{.key = key, .chunk = nullptr, .source = ChunkSource::store, .timings = {}};
-    const bool is_mesh = key.format == ChunkFormat::draco;
+    const bool is_mesh = key.format != ChunkFormat::columns;
     if (is_mesh) {
         if (auto known = stored_mesh(key)) {
             answer.chunk = std::move(known);
@@ -199,22 +200,31 @@ Result<EncodedChunk> ChunkBuilder::encode_columns(const ChunkKey& key, const Sta
     return encoded;
 }
 
+/// Leaves mesh_ empty where no surface can be.
+void ChunkBuilder::make_mesh(const ChunkKey& key, const Stack& stack) {
+    const std::int32_t y = key.position.y;
+    const std::int32_t height = context_.world->definition.grid.height;
+    mesh_.clear();
+    if (key.position.lod > 0) {
+        tile_mesher_.mesh(mesh_, stack, true);
+    } else if (beyond_every_surface(y, height)) {
+        return;
+    } else if (key.format == ChunkFormat::draco_blocky) {
+        blocky_mesher_.mesh(mesh_, stack, y, height);
+    } else {
+        mesher_.mesh(mesh_, stack, y, height);
+    }
+}
+
 Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey& key,
                                                const Stack& stack, AnswerTimings& timings) {
     const Grid& grid = context_.world->definition.grid;
-    const std::int32_t y = key.position.y;
     StageClock clock;
-    const bool is_tile = key.position.lod > 0;
-    mesh_.clear();
-    if (is_tile) {
-        tile_mesher_.mesh(mesh_, stack, true);
-    } else if (!beyond_every_surface(y, grid.height)) {
-        mesher_.mesh(mesh_, stack, y, grid.height);
-    }
+    make_mesh(key, stack);
     timings.mesh_us = clock.lap_us();
     EncodedChunk encoded;
     if (mesh_.triangle_count() == 0) {
-        cut_chunk(chunk_, stack, y, grid.height);
+        cut_chunk(chunk_, stack, key.position.y, grid.height);
         encoded.status = chunk_.uniform ? ChunkStatus::uniform : ChunkStatus::empty;
         if (chunk_.uniform) {
             encoded.uniform = chunk_.uniform_content.composition;
@@ -225,7 +235,7 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
     if (task.stop.stop_requested()) {
         return stopped();
     }
-    const std::int32_t height_voxels = is_tile ? tile_height_voxels_ : grid.height + 1;
+    const std::int32_t height_voxels = key.position.lod > 0 ? tile_height_voxels_ : grid.height + 1;
     auto payload = encode_draco(mesh_, {.side = grid.side, .height_voxels = height_voxels});
     if (!payload) {
         return tl::unexpected(payload.error());

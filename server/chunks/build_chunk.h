@@ -3,12 +3,13 @@
 //     mesh record in the store ── found ─────────────────────────────────────────────> answer
 //       └ stack: in memory | record in the store | generate, store.put ─> cut the chunk
 //           ├ columns: encode_chunk ─> payload (tag, zstd) ────────────────────────────> answer
-//           └ draco: surface nets ─> encode_draco ─> store.put ────────────────────────> answer
+//           └ draco, blocky: a mesher ─> encode_draco ─> store.put ────────────────────> answer
 //
 // A store only saves time: what it refuses to read or write is counted and served all the same, and
 // a record that can't be read back is made anew and overwritten.
 #pragma once
 
+#include "generator/mesh/blocky.h"
 #include "generator/mesh/height_field.h"
 #include "generator/mesh/surface_nets.h"
 #include "generator/terrain/generate_stack.h"
@@ -62,6 +63,7 @@ class ChunkBuilder {
     std::shared_ptr<const Stack> stored_stack(StackPos position);
     Result<EncodedChunk> encode_columns(const ChunkKey& key, const Stack& stack,
                                         AnswerTimings& timings);
+    void make_mesh(const ChunkKey& key, const Stack& stack);
     Result<EncodedChunk> encode_mesh(const Task& task, const ChunkKey& key, const Stack& stack,
                                      AnswerTimings& timings);
     std::shared_ptr<const EncodedChunk> stored_mesh(const ChunkKey& key);
@@ -72,6 +74,7 @@ class ChunkBuilder {
     BuildContext context_;
     StackGenerator generator_;
     SurfaceNetsMesher mesher_;
+    BlockyMesher blocky_mesher_;
     HeightFieldMesher tile_mesher_;
     std::int32_t tile_height_voxels_;  ///< what the tallest tile of any level needs in Draco's box
     Stack stack_;                      // scratch from here on

@@ -137,10 +137,15 @@ Result<WorkKey> ChunkService::checked(const WorkKey& key) const {
                         "y " + std::to_string(chunk->position.y) +
                             ": above level 0 a chunk is the whole height, and its y is 0");
         }
-        if (chunk->format != ChunkFormat::draco && chunk->format != ChunkFormat::columns) {
+        if (chunk->format > ChunkFormat::draco_blocky) {
             return fail(ErrorCode::unsupported,
                         "format " + std::to_string(static_cast<int>(chunk->format)) +
-                            ": this server has 0 (draco) and 1 (columns)");
+                            ": this server has 0 (draco), 1 (columns) and 2 (blocky)");
+        }
+        if (lod > 0 && chunk->format == ChunkFormat::draco_blocky) {
+            return fail(ErrorCode::unsupported,
+                        "level of detail " + std::to_string(lod) +
+                            " as blocky: only level 0 has blocks; ask for draco");
         }
         return WorkKey(chunk->normalised());
     }

@@ -181,6 +181,24 @@ TEST_F(Get, MoreThan64ChunksTakeSeveralRequests) {
     EXPECT_EQ(outcome.json().at("chunks").size(), 200U);
 }
 
+TEST_F(Get, NamesBlocksByTheirStyle) {
+    const ScriptedPeer peer([](PeerSocket& socket) {
+        socket.greet();
+        const auto request = socket.receive_kind<ChunkRequest>();
+        ASSERT_TRUE(request);
+        EXPECT_EQ(request->format, ChunkFormat::draco_blocky);
+        const Bytes payload = draco_square();
+        socket.send(answer_to(*request, request->keys[0], ChunkStatus::full, payload), payload);
+        socket.wait_for_end();
+    });
+    const auto outcome = run({"get", "--at", "-1,0,5", "--format", "blocky", "--server",
+                              peer.address(), "-o", path("blocks/"), "--obj", "--json"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(bytes_in(path("blocks/0_-1_0_5.blocky.draco")), draco_square());
+    EXPECT_FALSE(bytes_in(path("blocks/0_-1_0_5.obj")).empty());
+    EXPECT_EQ(outcome.json().at("chunks").at(0).at("triangles"), 2);
+}
+
 TEST_F(Get, DecodesColumns) {
     const ScriptedPeer peer(serving(uniform_columns));
     const auto outcome = run({"get", "--at", "1,2,3", "--format", "columns", "--server",

@@ -139,6 +139,39 @@ TEST(BuildChunk, AfterARestartEverythingComesFromTheStore) {
     EXPECT_EQ(p.generations(), 1U);
 }
 
+TEST(BuildChunk, BlocksAreWhatTheBlockyMesherMakesAndARecordOfTheirOwn) {
+    Pipeline p;
+    const Grid& grid = p.world->definition.grid;
+    StackGenerator generator(*p.world);
+    BlockyMesher mesher(p.world->definition);
+    Stack stack;
+    ASSERT_TRUE(generator.generate(stack, {.lod = 0, .x = 3, .z = -2}));
+    Mesh mesh;
+    std::vector<Hash128> etags;
+    int full = 0;
+    for (std::int32_t y = -1; y <= highest_chunk(*p.world); ++y) {
+        const ServedChunk smooth = p.chunk(key_of(y, ChunkFormat::draco));
+        const ServedChunk served = p.chunk(key_of(y, ChunkFormat::draco_blocky));
+        mesher.mesh(mesh, stack, y, grid.height);
+        ASSERT_EQ(served.chunk->status == ChunkStatus::full, mesh.triangle_count() > 0) << y;
+        if (served.chunk->status == ChunkStatus::full) {
+            const auto decoded = decode_draco(*served.chunk->payload);
+            ASSERT_TRUE(decoded);
+            EXPECT_EQ(decoded->triangle_count(), mesh.triangle_count());
+            EXPECT_NE(served.chunk->etag, smooth.chunk->etag);
+            ++full;
+        }
+        etags.push_back(served.chunk->etag);
+    }
+    EXPECT_GT(full, 0);
+    p.restart();
+    for (std::int32_t y = -1; y <= highest_chunk(*p.world); ++y) {
+        const ServedChunk again = p.chunk(key_of(y, ChunkFormat::draco_blocky));
+        EXPECT_EQ(again.source, ChunkSource::store);
+        EXPECT_EQ(again.chunk->etag, etags[static_cast<std::size_t>(y + 1)]);
+    }
+}
+
 TEST(BuildChunk, AMeshIsWhatTheMesherMakes) {
     Pipeline p;
     const Grid& grid = p.world->definition.grid;

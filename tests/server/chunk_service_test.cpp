@@ -118,8 +118,9 @@ TEST(ChunkService, FormatsOfOneChunkAreDifferentAnswers) {
     ASSERT_TRUE(f.request(ChunkKey{.position = at, .format = ChunkFormat::columns}));
     ASSERT_TRUE(
         f.request(ChunkKey{.position = at, .format = ChunkFormat::columns, .without_flow = true}));
-    f.inbox.wait(3);
-    EXPECT_EQ(f.gate.builds, 3);
+    ASSERT_TRUE(f.request(ChunkKey{.position = at, .format = ChunkFormat::draco_blocky}));
+    f.inbox.wait(4);
+    EXPECT_EQ(f.gate.builds, 4);
     const auto same =
         f.request(ChunkKey{.position = at, .format = ChunkFormat::draco, .without_flow = true});
     EXPECT_TRUE(same && *same) << "a mesh has no flow, so both are one";
@@ -249,6 +250,14 @@ TEST(ChunkService, RefusesWhatItCanNotMake) {
     const auto high = f.request(ChunkKey{.position = {.lod = 1, .x = 0, .y = 1, .z = 0}});
     ASSERT_FALSE(high);
     EXPECT_EQ(high.error().code, ErrorCode::out_of_range);
+    const auto unknown = f.request(ChunkKey{.position = {}, .format = static_cast<ChunkFormat>(3)});
+    ASSERT_FALSE(unknown);
+    EXPECT_EQ(unknown.error().code, ErrorCode::unsupported);
+    const auto far_blocks = f.request(ChunkKey{.position = {.lod = 1, .x = 0, .y = 0, .z = 0},
+                                               .format = ChunkFormat::draco_blocky});
+    ASSERT_FALSE(far_blocks);
+    EXPECT_EQ(far_blocks.error().code, ErrorCode::unsupported);
+    EXPECT_NE(far_blocks.error().message.find("blocky"), std::string::npos);
     constexpr std::int64_t kEnd = (std::int64_t{1} << 31) * 32;
     for (const std::int64_t at :
          {kEnd, -kEnd - 1, kColumnCoordinateLimit, std::numeric_limits<std::int64_t>::min(),

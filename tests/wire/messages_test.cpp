@@ -120,15 +120,26 @@ TEST(Messages, RequestIdZeroIsTheSession) {
               ErrorCode::invalid_argument);
 }
 
-TEST(Messages, UnknownFormatIsUnsupported) {
-    const auto message = decode_built([](auto& builder) {
-        const std::vector<wire::ChunkKey> keys(1);
-        const auto keys_at = builder.CreateVectorOfStructs(keys);
-        const auto request =
-            wire::CreateChunkRequest(builder, 1, static_cast<wire::Format>(200), keys_at);
-        return std::pair(wire::Body::ChunkRequest, request.Union());
-    });
-    EXPECT_EQ(code_of(message), ErrorCode::unsupported);
+TEST(Messages, FormatsAre0To2AndOthersUnsupported) {
+    const auto request_of = [](int format) {
+        return decode_built([format](auto& builder) {
+            const std::vector<wire::ChunkKey> keys(1);
+            const auto keys_at = builder.CreateVectorOfStructs(keys);
+            const auto request =
+                wire::CreateChunkRequest(builder, 1, static_cast<wire::Format>(format), keys_at);
+            return std::pair(wire::Body::ChunkRequest, request.Union());
+        });
+    };
+    for (const ChunkFormat format :
+         {ChunkFormat::draco, ChunkFormat::columns, ChunkFormat::draco_blocky}) {
+        const auto message = request_of(static_cast<int>(format));
+        ASSERT_TRUE(message) << message.error().message;
+        EXPECT_EQ(std::get<ChunkRequest>(*message).format, format);
+        EXPECT_NE(to_string(format), "unknown");
+    }
+    for (const int format : {3, 200, 255}) {
+        EXPECT_EQ(code_of(request_of(format)), ErrorCode::unsupported) << format;
+    }
 }
 
 TEST(Messages, FormatsOfANewerClientAreLeftOut) {
