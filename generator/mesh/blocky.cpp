@@ -29,7 +29,7 @@ namespace {
 using Word = std::uint64_t;
 
 constexpr std::int64_t kRangeVoxelsMax = std::int64_t{1} << 22;
-constexpr std::int64_t kBandVoxels = 62;  ///< owned bits of a word: 1..62
+constexpr std::int32_t kBandVoxels = 62;  ///< owned bits of a word: 1..62
 constexpr std::size_t kBits = 64;
 
 /// A direction faces look in. Lines of a plane run along axis `u` and lie along axis `v`.
@@ -165,7 +165,10 @@ struct BlockyMesher::Buffers {
     std::array<std::array<Word, kChunkSideMax>, kBits> layers{};
     std::vector<std::uint8_t> materials;  ///< [z][x][bit], where there is a face
 
+    std::vector<std::uint8_t> has_faces;  ///< by band: 0 where all is solid
+
     void start(const Stack& stack);
+    void find_bands(std::int32_t first_layer, std::int32_t layer_count);
     void fill_solid();
     Word find_faces(std::int32_t layer_count);
     void find_materials(const Stack& stack);
@@ -183,6 +186,29 @@ void BlockyMesher::Buffers::start(const Stack& stack) {
     }
     solid.resize(columns.column_count());
     materials.resize(side * side * kBits);
+}
+
+/// Finds the bands that a hollow span of a column reaches or touches; the others are solid
+/// throughout and have no face.
+void BlockyMesher::Buffers::find_bands(std::int32_t first_layer, std::int32_t layer_count) {
+    has_faces.assign(static_cast<std::size_t>((layer_count + kBandVoxels - 1) / kBandVoxels), 0);
+    const auto mark = [&](std::int32_t bottom256, std::int32_t top256) {
+        const std::int32_t from = std::max(voxels_under(bottom256) - 1 - first_layer, 0);
+        const std::int32_t to = std::min(voxels_under(top256) - first_layer, layer_count - 1);
+        for (std::int32_t band = from / kBandVoxels; band <= to / kBandVoxels && from <= to;
+             ++band) {
+            has_faces[static_cast<std::size_t>(band)] = 1;
+        }
+    };
+    mark(columns.lowest_top256, columns.highest256);
+    const SolidEnd* end = columns.many_ends.data();
+    for (std::size_t i = 1; i < columns.many.size(); i += 2) {
+        const SolidEnd* const top = end + columns.many[i] - 1;
+        for (; end < top; end += 2) {
+            mark(end->y256, end[1].y256);
+        }
+        ++end;
+    }
 }
 
 void BlockyMesher::Buffers::fill_solid() {
@@ -339,15 +365,19 @@ void BlockyMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights) {
         return;
     }
     b.start(stack);
-    for (std::int64_t y = first; y < last; y += kBandVoxels) {
-        const auto count = static_cast<std::int32_t>(std::min(last - y, kBandVoxels));
-        b.first = static_cast<std::int32_t>(y);
+    const auto layer_count = static_cast<std::int32_t>(last - first);
+    b.find_bands(static_cast<std::int32_t>(first), layer_count);
+    for (std::int32_t layer = 0; layer < layer_count; layer += kBandVoxels) {
+        if (b.has_faces[static_cast<std::size_t>(layer / kBandVoxels)] == 0) {
+            continue;
+        }
+        b.first = static_cast<std::int32_t>(first) + layer;
         b.fill_solid();
-        if (b.find_faces(count) == 0) {
+        if (b.find_faces(std::min(layer_count - layer, kBandVoxels)) == 0) {
             continue;
         }
         b.find_materials(stack);
-        const auto y256 = static_cast<std::int32_t>((y - 1 - heights.first) * kUnitsPerVoxel);
+        const auto y256 = static_cast<std::int32_t>((b.first - 1 - heights.first) * kUnitsPerVoxel);
         for (std::size_t direction = 0; direction < kDirections.size(); ++direction) {
             if (kDirections[direction].axis == kY) {
                 b.mesh_layers(out, direction, y256);

@@ -89,10 +89,11 @@ void mesh_blocks(benchmark::State& state) {
 
 BENCHMARK(mesh_blocks)->DenseRange(0, 3)->Unit(benchmark::kMicrosecond);
 
-void encode_stack(benchmark::State& state) {
+template <typename Mesher>
+void encode_stack_of(benchmark::State& state) {
     const char* const name = kWorlds[state.range(0)];
     const Tiles tiles(name);
-    SurfaceNetsMesher mesher(tiles.definition);
+    Mesher mesher(tiles.definition);
     std::vector<Mesh> meshes(tiles.stacks.size());
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         mesher.mesh(meshes[i], tiles.stacks[i], tiles.heights());
@@ -111,7 +112,17 @@ void encode_stack(benchmark::State& state) {
     state.counters["bytes/triangle"] = static_cast<double>(bytes) / static_cast<double>(triangles);
 }
 
+void encode_stack(benchmark::State& state) {
+    encode_stack_of<SurfaceNetsMesher>(state);
+}
+
 BENCHMARK(encode_stack)->DenseRange(0, 3)->Unit(benchmark::kMicrosecond);
+
+void encode_blocks(benchmark::State& state) {
+    encode_stack_of<BlockyMesher>(state);
+}
+
+BENCHMARK(encode_blocks)->DenseRange(0, 3)->Unit(benchmark::kMicrosecond);
 
 void decode_stack(benchmark::State& state) {
     const char* const name = kWorlds[state.range(0)];
