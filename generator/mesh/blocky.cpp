@@ -182,7 +182,7 @@ void BlockyMesher::Buffers::start(const Stack& stack) {
     side = static_cast<std::size_t>(stack.side);
     palette_materials.clear();
     for (const PaletteEntry& entry : stack.palette) {
-        palette_materials.push_back(main_material(entry.composition, entry.composition, 0));
+        palette_materials.push_back(main_material(entry.composition));
     }
     solid.resize(columns.column_count());
     materials.resize(side * side * kBits);

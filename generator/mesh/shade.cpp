@@ -64,6 +64,14 @@ std::vector<Shade> material_shades_of(const WorldDefinition& definition) {
     return shades;
 }
 
+std::uint8_t main_material(const Composition& composition) {
+    Share main;
+    for (const Share& share : composition.shares()) {
+        main = share.concentration > main.concentration ? share : main;
+    }
+    return static_cast<std::uint8_t>(main.material);
+}
+
 std::uint8_t main_material(const Composition& low, const Composition& high, double t) {
     Share main;
     for (const Composition* composition : {&low, &high}) {

@@ -30,6 +30,9 @@ std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition);
 /// Every material's own colour and index, by material index.
 std::vector<Shade> material_shades_of(const WorldDefinition& definition);
 
+/// The material with the largest share; the first of equals.
+std::uint8_t main_material(const Composition& composition);
+
 /// The material with the largest share of (1 - t) * low + t * high; the first of equals.
 std::uint8_t main_material(const Composition& low, const Composition& high, double t);
 
