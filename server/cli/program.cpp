@@ -18,6 +18,7 @@ int run_program(int argc, char** argv) {
     add_column_command(app, exit_code);
     add_slice_command(app, exit_code);
     add_picture_command(app, exit_code);
+    add_report_command(app, exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

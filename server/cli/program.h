@@ -23,5 +23,6 @@ void add_world_command(CLI::App& app, int& exit_code);
 void add_column_command(CLI::App& app, int& exit_code);
 void add_slice_command(CLI::App& app, int& exit_code);
 void add_picture_command(CLI::App& app, int& exit_code);
+void add_report_command(CLI::App& app, int& exit_code);
 
 }  // namespace terrane

@@ -48,26 +48,51 @@ const CaveInterval* find_cave(std::span<const CaveInterval> caves, std::uint16_t
     return found == caves.end() ? nullptr : &*found;
 }
 
+/// Where a cave closes in a column that does not have it, seen from a column that has: at the cave
+/// that it touches if that one goes on, so that no rock is left between the two.
+float closing_height(const CaveInterval& cave, std::span<const CaveInterval> having,
+                     std::span<const CaveInterval> lacking) {
+    for (const CaveInterval& other : having) {
+        const bool under = other.lid == cave.floor;
+        if (!under && other.floor != cave.lid) {
+            continue;
+        }
+        if (const CaveInterval* there = find_cave(lacking, other.palette_id)) {
+            return under ? there->lid : there->floor;
+        }
+    }
+    return cave.floor;
+}
+
 /// Vertical distance to one cave's surface, below 0 inside it.
 double distance_to_cave(const SceneTile& tile, const CellWeights& cell, std::uint16_t palette_id,
                         double y) {
     std::array<const CaveInterval*, 4> corners{};
-    float closed = 0;  // where it closes in columns that do not have it: its mean floor
-    float having = 0;
     for (std::size_t i = 0; i < 4; ++i) {
         corners[i] = find_cave(caves_of(tile, cell.column[i]), palette_id);
-        if (corners[i] != nullptr) {
-            closed += corners[i]->floor;
-            having += 1;
-        }
     }
-    closed /= having;
     double floor = 0;
     double lid = 0;
     for (std::size_t i = 0; i < 4; ++i) {
-        const bool has = corners[i] != nullptr;
-        floor += cell.weight[i] * static_cast<double>(has ? corners[i]->floor : closed);
-        lid += cell.weight[i] * static_cast<double>(has ? corners[i]->lid : closed);
+        float low = 0;
+        float high = 0;
+        if (corners[i] != nullptr) {
+            low = corners[i]->floor;
+            high = corners[i]->lid;
+        } else {
+            float having = 0;
+            for (std::size_t j = 0; j < 4; ++j) {
+                if (corners[j] != nullptr) {
+                    low += closing_height(*corners[j], caves_of(tile, cell.column[j]),
+                                          caves_of(tile, cell.column[i]));
+                    having += 1;
+                }
+            }
+            low /= having;
+            high = low;
+        }
+        floor += cell.weight[i] * static_cast<double>(low);
+        lid += cell.weight[i] * static_cast<double>(high);
     }
     return std::max(floor - y, y - (lid + kThinnest));
 }

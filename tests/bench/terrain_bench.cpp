@@ -5,7 +5,7 @@
 #include "generator/terrain/random.h"
 #include "generator/terrain/world.h"
 #include "tests/bench/bench_world.h"
-#include "tests/bench/perlin.h"
+#include "generator/baseline/voxel_perlin.h"
 #include "tests/bench/ratios.h"
 
 #include <benchmark/benchmark.h>

@@ -14,7 +14,7 @@
 #include <numeric>
 #include <utility>
 
-namespace terrane::bench {
+namespace terrane {
 
 class ClassicPerlin {
   public:
@@ -84,4 +84,4 @@ struct PerlinVoxel {
     float flow_z = 0;
 };
 
-}  // namespace terrane::bench
+}  // namespace terrane

@@ -1,0 +1,10 @@
+# Puts the shipped world files into the program, so that `terrane report` needs no other file.
+file(GLOB world_files CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/generator/worlds/*.toml)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${world_files})
+set(entries "")
+foreach(path IN LISTS world_files)
+    get_filename_component(name ${path} NAME_WE)
+    file(READ ${path} text)
+    string(APPEND entries "    {\"${name}\", R\"world(${text})world\"},\n")
+endforeach()
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/server/report/shipped_world_texts.inc CONTENT "${entries}" @ONLY)
