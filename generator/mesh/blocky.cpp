@@ -20,7 +20,6 @@
 #include <bit>
 #include <cstddef>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace terrane {
