@@ -45,7 +45,7 @@ void write_online_rate(Page& page, const SpeedTable& speed) {
     chart.groups.emplace_back("PN");
     chart.series[0].values.push_back(rate(speed.perlin.median));
     chart.series[1].values.push_back(rate(speed.perlin.median));
-    chart.groups.emplace_back("PN tuned");
+    chart.groups.emplace_back("tuned");
     chart.series[0].values.push_back(rate(speed.tuned_perlin.median));
     chart.series[1].values.push_back(rate(speed.tuned_perlin.median));
     page.chart("online-rate", chart);

@@ -40,11 +40,12 @@ border-radius:4px}
 svg text{font-family:system-ui,"Segoe UI",Helvetica,Arial,"DejaVu Sans",sans-serif;fill:#1c2024}
 svg .t{font-size:11.5px}svg .q{fill:#4a5259}svg .ct{font-size:13.5px;font-weight:600}
 svg .g{stroke:#e3e7ea}svg .a{stroke:#596068}svg .e{stroke:#1c2024;stroke-width:1.3}
-@media (max-width:760px){figure.half{width:100%}nav{columns:1}}
+@media screen and (max-width:760px){figure.half{width:100%}nav{columns:1}}
 @media print{body{font-size:10.5pt}main{max-width:none;padding:0}h2{break-after:avoid}
 h3{break-after:avoid}figure,svg,tr{break-inside:avoid}nav{columns:2;background:none;padding:0}
-a{color:inherit}.row{gap:8px 12px}th{background:none}table{font-size:8.5pt}
-th,td{padding:3px 5px}svg.chart{max-width:88mm}}
+a{color:inherit}.row{gap:8px 12px}th{background:none}table{font-size:7.5pt}
+th,td{padding:2px 4px}svg.chart{max-width:88mm}
+svg.chart[width="720"]{max-width:150mm}svg.chart[width="300"]{max-width:57mm}}
 )css";
 
 std::string base64(std::span<const std::byte> bytes) {

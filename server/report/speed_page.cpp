@@ -129,7 +129,7 @@ void write_figure(Page& page, const SpeedTable& table, bool online) {
     paper.groups.emplace_back("PN");
     paper.series[0].values.push_back(kPaperPerlin);
     paper.series[0].deviations.push_back(kPaperPerlinDeviation);
-    here.groups.emplace_back("PN tuned");
+    here.groups.emplace_back("tuned");
     here.series[0].values.push_back(table.tuned_perlin.median);
     page.begin_row();
     page.chart("figure-" + number + "-paper", paper);
