@@ -1,6 +1,7 @@
 #include "storage/rocksdb_store.h"
 
 #include "protocol/base/check.h"
+#include "protocol/base/mutex.h"
 #include "storage/record.h"
 #include "storage/store_directory.h"
 
@@ -62,6 +63,10 @@ class BackgroundErrors final : public rocksdb::EventListener {
     void OnBackgroundError(rocksdb::BackgroundErrorReason /*reason*/,
                            rocksdb::Status* status) override {
         ++count_;
+        const MutexLock lock(mutex_);
+        if (silent_) {
+            return;
+        }
         std::string sentence = directory_.root.string() +
                                ": writing failed in the background: " + status->ToString() +
                                "; serving goes on, nothing more is stored";
@@ -74,28 +79,84 @@ class BackgroundErrors final : public rocksdb::EventListener {
 
     std::uint64_t count() const { return count_; }
 
+    /// From now on nothing is told: who listens may be gone.
+    void silence() {
+        const MutexLock lock(mutex_);
+        silent_ = true;
+    }
+
   private:
     const StoreDirectory directory_;
     const RocksdbOptions options_;
+    Mutex mutex_;
+    bool silent_ TERRANE_GUARDED_BY(mutex_) = false;
     std::atomic<std::uint64_t> count_ = 0;
 };
 
+/// Holds what is not to be destroyed, so that it is no leak in the eyes of a leak checker.
+void keep_for_ever(rocksdb::DB* db) {
+    static Mutex mutex;
+    static auto* const kept = new std::vector<rocksdb::DB*>;
+    const MutexLock lock(mutex);
+    kept->push_back(db);
+}
+
 /// An open database; closes column families before it.
+///
+/// After a failed write it is never closed: RocksDB's writer of the log asserts in its destructor
+/// that what it took was flushed, which on a full disk ends the whole program. What was
+/// acknowledged is in the log and found again when a later process opens the database.
 struct Database {
     std::unique_ptr<rocksdb::DB> db;
     std::vector<rocksdb::ColumnFamilyHandle*> families;
     std::shared_ptr<BackgroundErrors> errors;
+    std::atomic<bool> writing_failed = false;
 
     Database() = default;
     Database(const Database&) = delete;
     Database& operator=(const Database&) = delete;
 
+    bool is_broken() const { return writing_failed || (errors && errors->count() > 0); }
+
     ~Database() {
+        if (errors) {
+            errors->silence();
+        }
+        if (db && is_broken()) {
+            keep_for_ever(db.release());
+            return;
+        }
         for (rocksdb::ColumnFamilyHandle* family : families) {
             db->DestroyColumnFamilyHandle(family);
         }
     }
 };
+
+/// Less free space than this is no place to begin work: RocksDB ends the program when its first
+/// files do not fit. The tables made of the logs that are read back come on top.
+constexpr std::uint64_t kFreeBytesMin = std::uint64_t{16} << 20U;
+
+Result<void> check_free_space(const StoreDirectory& directory) {
+    std::uint64_t needed_bytes = kFreeBytesMin;
+    std::error_code error;
+    std::filesystem::directory_iterator entries(directory.database(), error);
+    for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+        if (entries->path().extension() == ".log") {
+            std::error_code unknown;
+            const auto size_bytes = entries->file_size(unknown);
+            needed_bytes += unknown ? 0 : size_bytes;
+        }
+    }
+    const auto space = std::filesystem::space(directory.root, error);
+    if (!error && space.available < needed_bytes) {
+        return fail(ErrorCode::io_error,
+                    directory.root.string() +
+                        ": the disk is full: " + std::to_string(space.available >> 20U) +
+                        " MiB are free and " + std::to_string((needed_bytes >> 20U) + 1) +
+                        " are needed; make room or use another --data directory");
+    }
+    return {};
+}
 
 rocksdb::DBOptions database_options(const RocksdbOptions& options) {
     rocksdb::DBOptions out;
@@ -232,6 +293,7 @@ Result<void> claim(Database& database, const StoreDirectory& directory,
     if (slice_of(wanted) != rocksdb::Slice(stored)) {
         const rocksdb::Status written = database.db->Put(durable, family, key, slice_of(wanted));
         if (!written.ok()) {
+            database.writing_failed = true;
             return opening_failure(directory, written);
         }
     }
@@ -240,9 +302,10 @@ Result<void> claim(Database& database, const StoreDirectory& directory,
 
 class RocksdbStore final : public ChunkStore {
   public:
-    RocksdbStore(StoreDirectory directory, StoreIdentity identity,
+    RocksdbStore(StoreDirectory directory, StoreIdentity identity, DirectoryLock lock,
                  std::unique_ptr<Database> database)
         : directory_(std::move(directory)),
+          lock_(std::move(lock)),
           identity_(std::move(identity)),
           database_(std::move(database)) {}
 
@@ -279,6 +342,9 @@ class RocksdbStore final : public ChunkStore {
     }
 
     Result<void> put(std::span<const RecordToPut> records) override {
+        if (database_->is_broken()) {
+            return no_more_writing();
+        }
         rocksdb::WriteBatch batch;
         Bytes framed;
         for (const RecordToPut& record : records) {
@@ -287,7 +353,8 @@ class RocksdbStore final : public ChunkStore {
             const rocksdb::Status status = batch.Put(family_of(record.key), key, slice_of(framed));
             TERRANE_ASSERT(status.ok());
         }
-        auto written = done(database_->db->Write(rocksdb::WriteOptions(), &batch), "write");
+        auto written =
+            written_or_broken(database_->db->Write(rocksdb::WriteOptions(), &batch), "write");
         if (written) {
             puts_ += records.size();
         }
@@ -295,12 +362,20 @@ class RocksdbStore final : public ChunkStore {
     }
 
     Result<void> erase(const RecordKey& key) override {
-        return done(database_->db->Delete(rocksdb::WriteOptions(), family_of(key),
-                                          encode_key(identity_, key)),
-                    "erase");
+        if (database_->is_broken()) {
+            return no_more_writing();
+        }
+        return written_or_broken(database_->db->Delete(rocksdb::WriteOptions(), family_of(key),
+                                                       encode_key(identity_, key)),
+                                 "erase");
     }
 
-    Result<void> flush() override { return done(database_->db->SyncWAL(), "flush"); }
+    Result<void> flush() override {
+        if (database_->is_broken()) {
+            return no_more_writing();
+        }
+        return written_or_broken(database_->db->SyncWAL(), "flush");
+    }
 
     StoreStats stats() const override {
         return {.gets = gets_,
@@ -337,16 +412,27 @@ class RocksdbStore final : public ChunkStore {
         return std::nullopt;
     }
 
-    Result<void> done(const rocksdb::Status& status, const char* what) {
+    /// After the first failure nothing is written any more: see Database.
+    Result<void> written_or_broken(const rocksdb::Status& status, const char* what) {
         if (status.ok()) {
             return {};
         }
+        database_->writing_failed = true;
         ++failures_;
-        return fail(ErrorCode::io_error,
-                    directory_.root.string() + ": " + what + " failed: " + status.ToString());
+        return fail(ErrorCode::io_error, directory_.root.string() + ": " + what +
+                                             " failed: " + status.ToString() +
+                                             "; nothing more is stored until the next start");
+    }
+
+    Result<void> no_more_writing() {
+        ++failures_;
+        return fail(ErrorCode::io_error, directory_.root.string() +
+                                             ": nothing is stored any more since a write failed; "
+                                             "make room and start again");
     }
 
     const StoreDirectory directory_;
+    const DirectoryLock lock_;  // let go after the database is closed
     const StoreIdentity identity_;
     const std::unique_ptr<Database> database_;
     std::atomic<std::uint64_t> gets_ = 0;
@@ -364,6 +450,14 @@ Result<std::unique_ptr<ChunkStore>> open_rocksdb_store(const std::filesystem::pa
     const auto prepared = prepare_store_directory(directory);
     if (!prepared) {
         return tl::unexpected(prepared.error());
+    }
+    // Before anything is moved: a database in use must stay where it is.
+    auto lock = DirectoryLock::take(*prepared);
+    if (!lock) {
+        return tl::unexpected(lock.error());
+    }
+    if (const auto room = check_free_space(*prepared); !room) {
+        return tl::unexpected(room.error());
     }
     auto database = std::make_unique<Database>();
     if (const auto opened = open_or_rebuild(*database, *prepared, options); !opened) {
@@ -386,7 +480,8 @@ Result<std::unique_ptr<ChunkStore>> open_rocksdb_store(const std::filesystem::pa
     if (!claimed) {
         return tl::unexpected(claimed.error());
     }
-    return std::make_unique<RocksdbStore>(*prepared, identity, std::move(database));
+    return std::make_unique<RocksdbStore>(*prepared, identity, *std::move(lock),
+                                          std::move(database));
 }
 
 }  // namespace terrane

@@ -36,9 +36,14 @@ struct RocksdbOptions {
 /// A database damaged beyond opening is set aside as `rocksdb.damaged` (of which only the latest is
 /// kept) and a new one begun: everything in it can be made again.
 ///
+/// After a failed write, such as on a full disk, the store reads on and refuses every further write
+/// with `io_error`; what it took before is found again by a later process. Its database is then
+/// never closed (see Database), so that the same process cannot open the directory again.
+///
 /// Fails with `wrong_world` if it holds another fingerprint, `version_mismatch` if a later build
 /// made it, `invalid_argument` if the directory holds something else, and `io_error` if it cannot
-/// be read, written or locked. Every message says what to do.
+/// be read, written or locked, or if less than 16 MiB, and room for what is in its logs, are free.
+/// Every message says what to do.
 Result<std::unique_ptr<ChunkStore>> open_rocksdb_store(const std::filesystem::path& directory,
                                                        const StoreIdentity& identity,
                                                        const RocksdbOptions& options = {});

@@ -4,12 +4,18 @@
 #include "protocol/base/hash.h"
 #include "storage/record.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <charconv>
 #include <fstream>
 #include <iterator>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace terrane {
 namespace {
@@ -145,6 +151,31 @@ Result<StoreDirectory> prepare_store_directory(const fs::path& root) {
     }
     return directory;
 }
+
+Result<DirectoryLock> DirectoryLock::take(const StoreDirectory& directory) {
+    const int descriptor = ::open(directory.root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor < 0) {
+        return disk_failure(directory.root, "cannot be opened; use another --data directory",
+                            {errno, std::generic_category()});
+    }
+    DirectoryLock lock(descriptor);
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+        return fail(ErrorCode::io_error,
+                    directory.root.string() +
+                        ": is in use by another terrane; stop that one or use another --data "
+                        "directory");
+    }
+    return lock;
+}
+
+DirectoryLock::~DirectoryLock() {
+    if (descriptor_ >= 0) {
+        ::close(descriptor_);
+    }
+}
+
+DirectoryLock::DirectoryLock(DirectoryLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
 
 Result<bool> is_database_absent(const StoreDirectory& directory) {
     std::error_code error;

@@ -1,7 +1,7 @@
 // The data directory around a database: whose it is, what may be done in it. Knows files, no
 // RocksDB.
 //
-// One thread at a time per directory; the database's own lock keeps other processes out.
+// One thread at a time per directory; DirectoryLock keeps other processes out.
 #pragma once
 
 #include "protocol/base/result.h"
@@ -28,6 +28,24 @@ struct StoreDirectory {
 /// reads. Changes nothing when it refuses: `io_error`, `invalid_argument` (something else lives
 /// there) or `version_mismatch`.
 Result<StoreDirectory> prepare_store_directory(const std::filesystem::path& root);
+
+/// Keeps every other store, of this process or another, out of a data directory for as long as it
+/// lives. It is the kernel's lock on the directory itself: it leaves no file and ends with the
+/// process. Any thread.
+class DirectoryLock {
+  public:
+    /// Fails with `io_error` if somebody has it. A file system that knows no such lock gives one
+    /// that holds nothing; the database's own lock is left then.
+    static Result<DirectoryLock> take(const StoreDirectory& directory);
+    ~DirectoryLock();
+    DirectoryLock(DirectoryLock&& other) noexcept;
+    DirectoryLock& operator=(DirectoryLock&&) = delete;
+
+  private:
+    explicit DirectoryLock(int descriptor) : descriptor_(descriptor) {}
+
+    int descriptor_;
+};
 
 /// True if no database was begun here yet.
 Result<bool> is_database_absent(const StoreDirectory& directory);

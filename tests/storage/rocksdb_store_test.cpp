@@ -5,8 +5,10 @@
 #include "tests/storage/temporary_folder.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <mutex>
@@ -352,6 +354,57 @@ TEST_F(RocksdbStoreTest, OpensWithItsLogCutAnywhere) {
             EXPECT_FALSE(ended && got != "nothing") << "a later record outlived an earlier one";
             ended = ended || got == "nothing";
         }
+    }
+}
+
+// A note of damage makes the next opening move the database: not while somebody has it open.
+TEST_F(RocksdbStoreTest, StaysWhereItIsWhileInUse) {
+    auto store = open();
+    ASSERT_TRUE(store);
+    put(**store, stack_at(1), "kept");
+    write_file(database() / "TERRANE_DAMAGED", "for a test");
+    const auto second = open();
+    ASSERT_FALSE(second);
+    EXPECT_NE(second.error().message.find("in use by another terrane"), std::string::npos);
+    EXPECT_FALSE(fs::exists(data() / "rocksdb.damaged"));
+    EXPECT_EQ(text((*store)->get(stack_at(1))), "kept");
+}
+
+// Files that may not grow stand for a full disk: the log's write fails the same way.
+TEST_F(RocksdbStoreTest, OutlivesAFailedWriteAndKeepsWhatItTook) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit limit{};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    std::int32_t taken = 0;
+    {
+        auto store = open();
+        ASSERT_TRUE(store);
+        rlimit small = limit;
+        small.rlim_cur = rlim_t{1} << 20U;
+        ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+        const Bytes value(100'000, std::byte{7});
+        const auto put_one = [&](std::int32_t x) {
+            const RecordToPut record{.key = stack_at(x), .value = value};
+            return (*store)->put(std::span(&record, 1));
+        };
+        while (taken < 100 && put_one(taken)) {
+            ++taken;
+        }
+        ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
+        ASSERT_TRUE(taken > 0 && taken < 100) << taken;
+        EXPECT_FALSE(put_one(taken)) << "nothing more is written, even if there is room again";
+        EXPECT_FALSE((*store)->flush());
+        const auto read = (*store)->get(stack_at(0));
+        ASSERT_TRUE(read && *read);
+        EXPECT_EQ(**read, value);
+    }
+    // The broken database is still open in this process; a copy is what the next one finds.
+    fs::copy(data(), folder_.path() / "copy", fs::copy_options::recursive);
+    const auto again = open_rocksdb_store(folder_.path() / "copy", identity());
+    ASSERT_TRUE(again) << again.error().message;
+    for (std::int32_t x = 0; x < taken; ++x) {
+        const auto read = (*again)->get(stack_at(x));
+        EXPECT_TRUE(read && *read) << x;
     }
 }
 
