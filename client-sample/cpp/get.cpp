@@ -4,7 +4,7 @@
 #include "client-sample/cpp/get_report.h"
 #include "client-sample/cpp/obj.h"
 #include "client-sample/cpp/program.h"
-#include "client-sample/cpp/write_file.h"
+#include "protocol/base/write_file.h"
 
 #include <CLI/CLI.hpp>
 
@@ -85,14 +85,14 @@ void settle_chunk(GetRow& row, const ReceivedChunk& chunk, const Places& places,
     row.triangle_count = content->triangle_count();
     if (!places.output.empty()) {
         if (const auto written =
-                write_whole_file(places.payload_of(row.key, options.format), chunk.payload);
+                write_file(places.payload_of(row.key, options.format), chunk.payload);
             !written) {
             row.error = written.error();
         }
     }
     if (options.obj && content->mesh) {
         const std::string text = obj_of(*content->mesh, row.key, world);
-        if (const auto written = write_whole_file(places.obj_of(row.key), bytes_of(text));
+        if (const auto written = write_file(places.obj_of(row.key), bytes_of(text));
             !written) {
             row.error = written.error();
         }

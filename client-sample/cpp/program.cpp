@@ -1,5 +1,7 @@
 #include "client-sample/cpp/program.h"
 
+#include "protocol/base/command_line.h"
+
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -37,9 +39,14 @@ int run_client_program(int argc, const char* const* argv) {
         CLI::App app("Fetches terrain from a Terrane server and checks what it got.",
                      "terrane-client");
         app.require_subcommand(1);
+        app.set_version_flag("--version", TERRANE_VERSION);
         app.footer("Try: terrane-client get --help");
         add_get_command(app, exit_code);
         auto arguments = joined_arguments(argc, argv);
+        if (const auto slip = unknown_subcommand(app, arguments)) {
+            std::fprintf(stderr, "terrane-client: %s\n", slip->c_str());
+            return kClientWrongUse;
+        }
         std::ranges::reverse(arguments);  // as CLI11 wants them
         try {
             app.parse(arguments);
@@ -50,7 +57,7 @@ int run_client_program(int argc, const char* const* argv) {
         std::fprintf(stderr, "terrane-client: %s\n", error.what());
         return kClientFailed;
     }
-    return exit_code;
+    return exit_code == kClientDone && !output_is_whole() ? kClientFailed : exit_code;
 }
 
 }  // namespace terrane

@@ -1,26 +1,12 @@
 #include "generator/mesh/shade.h"
 
+#include "generator/volume/color.h"
+
 #include <algorithm>
 #include <cstddef>
 
 namespace terrane {
 namespace {
-
-double linear_channel(std::uint8_t value) {
-    const double s = value / 255.0;
-    if (s <= 0.04045) {
-        return s / 12.92;
-    }
-    // x^2.4 = x^2 * (x^2)^(1/5); the fifth root by Newton's steps from above, which only fall.
-    const double x = (s + 0.055) / 1.055;
-    const double square = x * x;
-    double root = 1.0;
-    for (int i = 0; i < 32; ++i) {
-        const double fourth = root * root * root * root;
-        root -= (fourth * root - square) / (5.0 * fourth);
-    }
-    return square * root;
-}
 
 std::uint8_t to_byte(float value) {
     return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
@@ -41,17 +27,11 @@ double share_of(const Composition& composition, std::uint16_t material) {
 
 }  // namespace
 
-LinearColor linear_color_of(Rgb8 srgb) {
-    return {.r = static_cast<float>(linear_channel(srgb.r)),
-            .g = static_cast<float>(linear_channel(srgb.g)),
-            .b = static_cast<float>(linear_channel(srgb.b))};
-}
-
 std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition) {
     std::vector<LinearColor> colors;
     colors.reserve(definition.materials.size());
     for (const Material& material : definition.materials) {
-        colors.push_back(linear_color_of(material.color));
+        colors.push_back(linear_from_srgb(material.color));
     }
     return colors;
 }

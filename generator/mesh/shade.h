@@ -21,9 +21,6 @@ struct Shade {
     friend bool operator==(const Shade&, const Shade&) = default;
 };
 
-/// sRGB (IEC 61966-2-1) to linear light, with + - * / only, so that all machines agree.
-LinearColor linear_color_of(Rgb8 srgb);
-
 /// The definition's material colours in linear light, by material index.
 std::vector<LinearColor> linear_colors_of(const WorldDefinition& definition);
 

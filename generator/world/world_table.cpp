@@ -29,23 +29,6 @@ constexpr std::string_view kRangeAllowed =
 /// A key this near to a missing one is taken for a slip of the pen.
 constexpr std::size_t kSlipEditsMax = 3;
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    a = a.substr(0, kQuotedBytesMax);
-    b = b.substr(0, kQuotedBytesMax);
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t{0});
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i + 1;
-        for (std::size_t j = 0; j < b.size(); ++j) {
-            const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-            diagonal = row[j + 1];
-            row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
-        }
-    }
-    return row[b.size()];
-}
-
 bool is_control(char c) {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
 }
@@ -84,19 +67,6 @@ std::string in_quotes(std::string_view text) {
         result += is_control(c) ? '?' : c;
     }
     return result + (cut ? "...\"" : "\"");
-}
-
-std::string_view nearest_word(std::string_view word, const std::vector<std::string>& known) {
-    std::string_view nearest;
-    std::size_t least = std::numeric_limits<std::size_t>::max();
-    for (const std::string& candidate : known) {
-        const std::size_t distance = edit_distance(word, candidate);
-        if (distance < least) {
-            least = distance;
-            nearest = candidate;
-        }
-    }
-    return nearest;
 }
 
 void WorldFaults::add(const toml::source_region& where, std::string key, std::string message) {

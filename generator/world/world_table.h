@@ -7,6 +7,7 @@
 
 #include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/nearest_word.h"
 
 #include <toml++/toml.h>
 
@@ -28,9 +29,6 @@ std::string number_text(double value);
 
 /// The text in quotation marks, cut to kQuotedBytesMax, control characters shown as '?'.
 std::string in_quotes(std::string_view text);
-
-/// Of `known`, the one with the least edit distance to `word`; empty if `known` is.
-std::string_view nearest_word(std::string_view word, const std::vector<std::string>& known);
 
 /// The faults of one file, in the order in which they were found.
 class WorldFaults {

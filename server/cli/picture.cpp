@@ -3,7 +3,7 @@
 #include "server/cli/open_world.h"
 #include "server/cli/png.h"
 #include "server/cli/program.h"
-#include "server/cli/write_file.h"
+#include "protocol/base/write_file.h"
 #include "server/render/render_picture.h"
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,9 @@
 #include "server/cli/program.h"
 
+#include "protocol/base/command_line.h"
+
 #include <CLI/CLI.hpp>
+
 #include <cstdio>
 #include <exception>
 
@@ -9,6 +12,7 @@ namespace terrane {
 int run_program(int argc, char** argv) {
     CLI::App app("Terrane makes volumetric terrain on request and streams it.", "terrane");
     app.require_subcommand(1);
+    app.set_version_flag("--version", TERRANE_VERSION);
     app.set_help_all_flag("--help-all", "Print the help of every subcommand");
     int exit_code = kExitDone;
     add_preseed_command(app, exit_code);
@@ -19,6 +23,10 @@ int run_program(int argc, char** argv) {
     add_slice_command(app, exit_code);
     add_picture_command(app, exit_code);
     add_report_command(app, exit_code);
+    if (const auto slip = unknown_subcommand(app, {argv + 1, argv + argc})) {
+        std::fprintf(stderr, "terrane: %s\n", slip->c_str());
+        return kExitWrongUse;
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -27,7 +35,7 @@ int run_program(int argc, char** argv) {
         std::fprintf(stderr, "terrane: %s\n", error.what());
         return kExitFailed;
     }
-    return exit_code;
+    return exit_code == kExitDone && !output_is_whole() ? kExitFailed : exit_code;
 }
 
 }  // namespace terrane

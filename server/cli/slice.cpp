@@ -5,7 +5,7 @@
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
-#include "server/cli/write_file.h"
+#include "protocol/base/write_file.h"
 
 #include <CLI/CLI.hpp>
 

@@ -1,5 +1,7 @@
 #include "generator/mesh/surface_nets.h"
 
+#include "generator/volume/color.h"
+
 #include "generator/mesh/shade.h"
 #include "tests/support/ascii_cut.h"
 #include "tests/support/drawn_worlds.h"
@@ -154,9 +156,9 @@ TEST(SurfaceNets, AnOverhangHasACeiling) {
 }
 
 TEST(SurfaceNets, ColorsAreLinearAndMixWithTheComposition) {
-    EXPECT_EQ(linear_color_of({.r = 0, .g = 255, .b = 10}).g, 1.0F);
-    EXPECT_NEAR(linear_color_of({.r = 188, .g = 0, .b = 10}).r, 0.502886F, 1e-6F);
-    EXPECT_NEAR(linear_color_of({.r = 188, .g = 0, .b = 10}).b, 10 / 255.0 / 12.92, 1e-7);
+    EXPECT_EQ(linear_from_srgb({.r = 0, .g = 255, .b = 10}).g, 1.0F);
+    EXPECT_NEAR(linear_from_srgb({.r = 188, .g = 0, .b = 10}).r, 0.502886F, 1e-6F);
+    EXPECT_NEAR(linear_from_srgb({.r = 188, .g = 0, .b = 10}).b, 10 / 255.0 / 12.92, 1e-7);
 
     const Letters letters("ab.");
     std::vector<PaletteShade> shades;

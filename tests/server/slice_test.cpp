@@ -2,7 +2,7 @@
 
 #include "generator/terrain/generate_stack.h"
 #include "server/cli/program.h"
-#include "server/cli/write_file.h"
+#include "protocol/base/write_file.h"
 #include "tests/support/test_world.h"
 
 #include <gtest/gtest.h>

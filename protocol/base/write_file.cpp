@@ -1,4 +1,4 @@
-#include "server/cli/write_file.h"
+#include "protocol/base/write_file.h"
 
 #include <unistd.h>
 
