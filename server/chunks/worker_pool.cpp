@@ -2,19 +2,42 @@
 
 #include "protocol/base/check.h"
 
+#include <exception>
+#include <future>
+#include <utility>
+
 namespace terrane {
 
 WorkerPool::WorkerPool(std::size_t workers, WorkQueue& queue,
                        const std::function<RunJob()>& make_run_job) {
     TERRANE_ASSERT(workers >= 1 && workers <= kWorkersMax);
     threads_.reserve(workers);
-    for (std::size_t i = 0; i < workers; ++i) {
-        threads_.emplace_back([&queue, make_run_job] {
-            const RunJob run_job = make_run_job();
-            while (const auto job = queue.pop()) {
-                run_job(*job);
-            }
-        });
+    std::vector<std::future<void>> ready;
+    try {
+        ready.reserve(workers);
+        for (std::size_t i = 0; i < workers; ++i) {
+            std::promise<void> promise;
+            ready.push_back(promise.get_future());
+            threads_.emplace_back([&queue, make_run_job, is_ready = std::move(promise)]() mutable {
+                RunJob run_job;
+                try {
+                    run_job = make_run_job();
+                } catch (...) {
+                    is_ready.set_exception(std::current_exception());
+                    return;
+                }
+                is_ready.set_value();
+                while (const auto job = queue.pop()) {
+                    run_job(*job);
+                }
+            });
+        }
+        for (std::future<void>& worker : ready) {
+            worker.get();
+        }
+    } catch (...) {
+        queue.close();  // or those that did start would wait for jobs, and we for them
+        throw;
     }
 }
 

@@ -20,6 +20,8 @@ class WorkerPool {
     using RunJob = std::function<void(JobId)>;
 
     /// `make_run_job` is called once on each worker's own thread. `workers` is 1..kWorkersMax.
+    /// Returns when all are ready. If a thread can't be started or `make_run_job` throws, closes
+    /// the queue and throws that.
     WorkerPool(std::size_t workers, WorkQueue& queue, const std::function<RunJob()>& make_run_job);
 
   private:

@@ -171,10 +171,18 @@ Result<std::uint64_t> for_each_batch(const StackBatches& batches, const BatchWor
     {
         std::vector<std::jthread> threads;
         threads.reserve(workers.count);
-        for (std::size_t i = 0; i < workers.count; ++i) {
-            threads.emplace_back([&] { run_worker(run, batches, workers); });
+        try {
+            for (std::size_t i = 0; i < workers.count; ++i) {
+                threads.emplace_back([&] { run_worker(run, batches, workers); });
+            }
+            watch(run, workers);
+        } catch (const std::exception& error) {  // no such thread, or the tick's own
+            run.stop = true;
+            const MutexLock lock(run.mutex);
+            if (!run.failure) {
+                run.failure = Error{.code = ErrorCode::internal, .message = error.what()};
+            }
         }
-        watch(run, workers);
     }
     const MutexLock lock(run.mutex);
     if (run.failure) {

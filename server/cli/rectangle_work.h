@@ -63,7 +63,8 @@ struct BatchWorkers {
 };
 
 /// Runs every batch once, or until something fails or `tick` says to stop. Gives the stacks done;
-/// fewer than `batches.stacks()` means stopped. Fails with the first failure of a step.
+/// fewer than `batches.stacks()` means stopped. Fails with the first failure of a step;
+/// what `make_step` or `tick` throws, or a thread that can't be started, is `internal`.
 Result<std::uint64_t> for_each_batch(const StackBatches& batches, const BatchWorkers& workers);
 
 }  // namespace terrane

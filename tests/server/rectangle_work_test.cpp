@@ -165,5 +165,35 @@ TEST(ForEachBatch, StopsWhenTheTickSaysSo) {
     EXPECT_LE(*done, 2 * kBatchStacksMax) << "the batches under way, no others";
 }
 
+TEST(ForEachBatch, EndsWhenAWorkerCannotBeMade) {
+    const auto batches = StackBatches::cut(kRagged);
+    ASSERT_TRUE(batches);
+    std::atomic<int> made = 0;
+    const auto done = for_each_batch(
+        *batches, {.count = 3,
+                   .make_step = [&]() -> BatchStep {
+                       if (made++ == 1) {
+                           throw std::runtime_error("no room for a step");
+                       }
+                       return [](std::span<const StackPos>) -> Result<void> { return {}; };
+                   },
+                   .tick = {}});
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().message, "no room for a step");
+}
+
+TEST(ForEachBatch, EndsWhenItsTickThrows) {
+    const auto batches = StackBatches::cut(kRagged);
+    ASSERT_TRUE(batches);
+    const auto done = for_each_batch(
+        *batches, {.count = 2,
+                   .make_step = []() -> BatchStep {
+                       return [](std::span<const StackPos>) -> Result<void> { return {}; };
+                   },
+                   .tick = [](std::uint64_t) -> bool { throw std::runtime_error("no tick"); }});
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().message, "no tick");
+}
+
 }  // namespace
 }  // namespace terrane
