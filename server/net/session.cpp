@@ -2,6 +2,7 @@
 
 #include "protocol/wire/limits.h"
 
+#include <algorithm>
 #include <unordered_set>
 #include <utility>
 #include <vector>
@@ -27,12 +28,12 @@ Session::Session(const SessionContext& context, Post post, Clock::time_point now
     : context_(context),
       post_(std::move(post)),
       connected_(now),
-      last_input_(now),
+      last_sign_(now),
       last_frame_(now) {}
 
 void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
-    last_input_ = now;
-    ping_sent_ = false;
+    last_sign_ = now;
+    ping_sent_.reset();
     if (reader_.buffered_bytes() == 0) {
         last_frame_ = now;
     }
@@ -42,7 +43,17 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
 
 void Session::written(std::size_t size_bytes, Clock::time_point now) {
     write_waits_since_.reset();
+    const bool wanted_input = wants_input();
     outbox_.consume(size_bytes);
+    // Who reads is there. But that our ping alone went out says nothing.
+    if (!only_ping_waits_) {
+        last_sign_ = now;
+    }
+    only_ping_waits_ = only_ping_waits_ && !outbox_.empty();
+    if (!wanted_input && wants_input()) {  // until now the client was not listened to
+        last_frame_ = now;
+        ping_sent_.reset();
+    }
     submit();
     process(now);
 }
@@ -104,7 +115,7 @@ void Session::handle_one(const ChunkRequest& request) {
                              .format = request.format,
                              .without_flow = request.without_flow},
              .known_etag = request.known_etags.empty() ? Hash128{} : request.known_etags[i],
-             .priority = request.priority,
+             .priority = std::clamp(request.priority, kPriorityMin, kPriorityMax),
              .rank = {}});
     }
     submit();
@@ -309,6 +320,7 @@ void Session::close_with(Error error) {
 
 void Session::send(const AnyMessage& message, SharedBytes payload) {
     if (stage_ != Stage::closing && stage_ != Stage::dead) {
+        only_ping_waits_ = only_ping_waits_ && outbox_.empty();
         outbox_.push(encode_message(message), std::move(payload));
     }
 }
@@ -331,12 +343,14 @@ void Session::tick(Clock::time_point now) {
         close_with({.code = ErrorCode::malformed, .message = "no ClientHello in time"});
     } else if (reader_.buffered_bytes() > 0 && now - last_frame_ > limits.stall) {
         close_with({.code = ErrorCode::malformed, .message = "a frame was not ended in time"});
-    } else if (now - last_input_ > limits.idle && under_way_.empty()) {
+    } else if (ping_sent_ && now - last_sign_ > limits.idle &&
+               now - *ping_sent_ > limits.idle - limits.ping && under_way_.empty()) {
         close_reason_ = "silent for too long";
         send(Goodbye{.code = std::nullopt, .reason = close_reason_});
         stage_ = Stage::closing;
-    } else if (now - last_input_ > limits.ping && !ping_sent_ && stage_ == Stage::open) {
-        ping_sent_ = true;
+    } else if (now - last_sign_ > limits.ping && !ping_sent_ && stage_ == Stage::open) {
+        ping_sent_ = now;
+        only_ping_waits_ = outbox_.empty();
         send(Ping{.nonce = next_sequence_});
     }
 }

@@ -33,6 +33,10 @@ namespace terrane {
 /// that no client fills the work queue.
 inline constexpr std::size_t kWishesUnderWayMax = 128;
 
+/// What a client's priority is clamped to: no wish of one session may starve the others' for long.
+inline constexpr std::int32_t kPriorityMin = -8;
+inline constexpr std::int32_t kPriorityMax = 8;
+
 struct SessionTimeouts {
     std::chrono::milliseconds hello{10'000};  ///< connected, and no ClientHello yet
     std::chrono::milliseconds stall{30'000};  ///< a frame begun and not ended; a write that stands
@@ -143,10 +147,11 @@ class Session : public std::enable_shared_from_this<Session> {
     std::string client_name_;
     std::string close_reason_;
     const Clock::time_point connected_;
-    Clock::time_point last_input_;
+    Clock::time_point last_sign_;   ///< of life: it sent something, or read what we sent
     Clock::time_point last_frame_;  ///< ended, or the next one's first bytes
     std::optional<Clock::time_point> write_waits_since_;
-    bool ping_sent_ = false;
+    std::optional<Clock::time_point> ping_sent_;  ///< and no answer yet
+    bool only_ping_waits_ = false;                ///< the outbox holds our ping and nothing else
 };
 
 }  // namespace terrane

@@ -386,10 +386,40 @@ TEST(Session, AsksTheSilentAndThenLeavesThem) {
     f.session->tick(f.now + 25s);
     EXPECT_FALSE(f.session->is_closing());
     f.session->tick(f.now + 61s);
+    EXPECT_FALSE(f.session->is_closing()) << "it was not asked";
+    messages = f.read();
+    ASSERT_FALSE(messages.empty());
+    EXPECT_TRUE(std::holds_alternative<Ping>(messages.back()));
+    f.session->tick(f.now + 92s);
     messages = f.read();
     ASSERT_FALSE(messages.empty());
     EXPECT_TRUE(std::holds_alternative<Goodbye>(messages.back()));
     EXPECT_TRUE(f.session->is_closing());
+}
+
+// Its answers fill the outbox, so that it is not even listened to: every byte it takes counts.
+TEST(Session, KeepsAClientThatReadsSlowly) {
+    Fixture f(std::size_t{1} << 20U);
+    f.hello();
+    f.request(1, {at(0)});
+    f.mailbox.run(1);
+    f.read();
+    for (std::uint32_t id = 2; id < 14; ++id) {
+        f.request(id, {at(0)});  // out of the cache
+    }
+    ASSERT_GT(f.session->outbox().bytes(), std::size_t{1} << 20U);
+    for (int second = 0; second < 61; ++second) {
+        f.now += 1s;
+        f.session->tick(f.now);
+        f.session->written(1000, f.now);
+        ASSERT_FALSE(f.session->is_closing()) << second;
+    }
+    while (!f.session->outbox().empty()) {
+        f.session->written(f.session->outbox().bytes(), f.now);
+    }
+    f.session->tick(f.now);
+    EXPECT_FALSE(f.session->is_closing());
+    EXPECT_TRUE(f.session->wants_input());
 }
 
 TEST(Session, LeavesAClientThatDoesNotRead) {
