@@ -5,11 +5,13 @@
 #include "protocol/wire/limits.h"
 #include "server/chunks/build_chunk.h"
 #include "server/chunks/store_identity.h"
+#include "server/notice_limit.h"
 #include "storage/memory_store.h"
 #include "storage/rocksdb_store.h"
 
 #include <sys/resource.h>
 
+#include <exception>
 #include <string>
 #include <utility>
 
@@ -117,7 +119,13 @@ struct Server::Impl {
                           .store = store.get(),
                           .stacks = &stacks,
                           .counters = &counters,
-                          .on_notice = [this](std::string_view notice) { log.warning(notice); }});
+                          .on_notice = [this](std::string_view notice) { log.warning(notice); },
+                          .on_store_failure =
+                              [this](std::string_view failure) {
+                                  if (store_notices.allows()) {
+                                      log.warning(failure);
+                                  }
+                              }});
                       return [builder = std::move(builder)](const Task& task) {
                           return builder->build(task);
                       };
@@ -130,6 +138,7 @@ struct Server::Impl {
     const Log& log;
     const std::shared_ptr<const World> world;
     const std::unique_ptr<ChunkStore> store;
+    NoticeLimit store_notices{std::chrono::minutes{1}};
     ServiceCounters counters;
     StackCache stacks;
     ChunkService service;
@@ -142,10 +151,25 @@ Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, cons
     if (!store) {
         return tl::unexpected(store.error());
     }
-    auto impl = std::make_unique<Impl>(options, log, *std::move(store));
+    std::unique_ptr<Impl> impl;
+    try {
+        impl = std::make_unique<Impl>(options, log, *std::move(store));
+    } catch (const std::exception& error) {
+        return fail(ErrorCode::internal, std::to_string(options.workers) +
+                                             " workers cannot be started: " + error.what() +
+                                             "; use fewer --workers or allow more memory");
+    }
     ListenOptions listen = options.listen;
     if (!listen.on_event) {
         listen.on_event = [&log](std::string_view event) { log.debug(event); };
+    }
+    if (!listen.on_fault) {
+        listen.on_fault = [&log, limit = std::make_shared<NoticeLimit>(std::chrono::seconds{1})](
+                              std::string_view fault) {
+            if (limit->allows()) {
+                log.warning(fault);
+            }
+        };
     }
     auto listener = TcpListener::open(listen, impl->sessions);
     if (!listener) {

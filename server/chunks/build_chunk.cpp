@@ -37,6 +37,19 @@ tl::unexpected<Error> stopped() {
     return fail(ErrorCode::cancelled, "nobody waits for it any more");
 }
 
+/// More than a column's message takes: FlatBuffers' tables, offsets and padding included.
+std::size_t head_bytes_of(const Stack& stack, std::span<const Limit> limits) {
+    constexpr std::size_t kBesideBytes = 256;
+    constexpr std::size_t kLimitBytes = 96;
+    constexpr std::size_t kShareBytes = 32;
+    std::size_t size_bytes = kBesideBytes;
+    for (const Limit& limit : limits) {
+        size_bytes +=
+            kLimitBytes + kShareBytes * stack.palette[limit.palette_id].composition.shares().size();
+    }
+    return size_bytes;
+}
+
 /// No surface can be there: below the base, or above the highest world that is allowed.
 bool beyond_every_surface(std::int32_t y, std::int32_t height) {
     return y < 0 || static_cast<std::int64_t>(y) * height > kHeightBoundMax + 1;
@@ -113,6 +126,12 @@ Result<Answer> ChunkBuilder::build_column(const Task& task, ColumnPos column) {
     auto limits = std::make_shared<std::vector<ColumnLimit>>();
     const auto x = static_cast<std::int32_t>(floor_mod(column.x, side));
     const auto z = static_cast<std::int32_t>(floor_mod(column.z, side));
+    if (const auto column_limits = stack.columns.column(x, z);
+        column_limits.size() > kWireLimitsMax ||
+        head_bytes_of(stack, column_limits) > kOutboundHeadBytesMax) {
+        return fail(ErrorCode::too_large, "a column of " + std::to_string(column_limits.size()) +
+                                              " limits is too large for one message");
+    }
     for (const Limit& limit : stack.columns.column(x, z)) {
         limits->push_back({.y256 = limit.y256,
                            .flow = limit.flow,
@@ -193,8 +212,17 @@ Result<EncodedChunk> ChunkBuilder::encode_columns(const ChunkKey& key, const Sta
         encoded.uniform = chunk_.uniform_content.composition;
     } else {
         encode_chunk(bytes_, chunk_, key.without_flow ? FlowPlane::without : FlowPlane::with);
+        if (bytes_.size() > kColumnChunkBytesMax) {
+            return fail(ErrorCode::too_large,
+                        "columns of " + std::to_string(bytes_.size()) + " bytes");
+        }
         encoded.status = ChunkStatus::full;
         encoded.payload = std::make_shared<const Bytes>(encode_column_payload(bytes_));
+        if (encoded.payload->size() > kPayloadBytesMax) {
+            return fail(
+                ErrorCode::too_large,
+                "columns of " + std::to_string(encoded.payload->size()) + " compressed bytes");
+        }
     }
     timings.encode_us = clock.lap_us();
     return encoded;
@@ -252,7 +280,7 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
 std::optional<Bytes> ChunkBuilder::read_record(const RecordKey& key) {
     auto found = context_.store->get(key);
     if (!found) {
-        raise(context_.counters->store_failures);
+        store_failed(found.error());
         return std::nullopt;
     }
     return *std::move(found);
@@ -260,8 +288,15 @@ std::optional<Bytes> ChunkBuilder::read_record(const RecordKey& key) {
 
 void ChunkBuilder::write_record(const RecordKey& key, std::span<const std::byte> value) {
     const RecordToPut record{.key = key, .value = value};
-    if (!context_.store->put(std::span(&record, 1))) {
-        raise(context_.counters->store_failures);
+    if (const auto written = context_.store->put(std::span(&record, 1)); !written) {
+        store_failed(written.error());
+    }
+}
+
+void ChunkBuilder::store_failed(const Error& error) {
+    raise(context_.counters->store_failures);
+    if (context_.on_store_failure) {
+        context_.on_store_failure(error.message);
     }
 }
 

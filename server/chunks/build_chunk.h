@@ -40,6 +40,8 @@ struct BuildContext {
     ServiceCounters* counters = nullptr;
     /// Told about each record that could not be read, in a sentence; may be empty. Must not throw.
     std::function<void(std::string_view)> on_notice;
+    /// Told about each read or write that the store refused; may be empty. Must not throw.
+    std::function<void(std::string_view)> on_store_failure;
 };
 
 /// One worker's pipeline and its scratch buffers. Belongs to one thread.
@@ -69,6 +71,7 @@ class ChunkBuilder {
     std::shared_ptr<const EncodedChunk> stored_mesh(const ChunkKey& key);
     std::optional<Bytes> read_record(const RecordKey& key);
     void write_record(const RecordKey& key, std::span<const std::byte> value);
+    void store_failed(const Error& error);
     void corrupt_record(std::string_view what, const RecordKey& key, const Error& error);
 
     BuildContext context_;

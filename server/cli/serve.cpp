@@ -3,7 +3,9 @@
 //
 // SIGTERM and SIGINT drain: what is under way is answered, everybody gets a goodbye, the store is
 // flushed, exit code 0. A second signal ends the program at once.
+#include "generator/world/world_file.h"
 #include "protocol/base/hash.h"
+#include "protocol/wire/limits.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/server.h"
@@ -108,6 +110,12 @@ int run_serve(const ServeArguments& arguments) {
     if (!options.world) {
         return kExitWrongUse;
     }
+    const std::size_t world_bytes = canonical_world_file(options.world->definition).size();
+    if (world_bytes > kWorldTextBytesMax) {
+        return wrong_use(arguments.world + ": " + std::to_string(world_bytes) +
+                         " bytes when written out in full; at most " +
+                         std::to_string(kWorldTextBytesMax) + " can be sent to clients");
+    }
     options.data_directory = arguments.data;
     options.listen.endpoint = *endpoint;
     options.workers = arguments.workers;
@@ -121,6 +129,13 @@ int run_serve(const ServeArguments& arguments) {
         std::fprintf(stderr, "terrane: %s\n", server.error().message.c_str());
         return kExitFailed;
     }
+    if (*format == LogFormat::json) {
+        log.info("listening", {{"tcp", to_string((*server)->endpoint())},
+                               {"world", options.world->definition.name},
+                               {"fingerprint", to_hex(options.world->fingerprint)},
+                               {"workers", std::uint64_t{options.workers}},
+                               {"store", arguments.store}});
+    }
     std::printf("listening on tcp %s: world \"%s\", fingerprint %s, %zu workers, %s store\n",
                 to_string((*server)->endpoint()).c_str(), options.world->definition.name.c_str(),
                 to_hex(options.world->fingerprint).c_str(), options.workers,
@@ -132,7 +147,9 @@ int run_serve(const ServeArguments& arguments) {
     (*server)->stop();
     log.info("stopped", {{"generations", count_of((*server)->counters().generations)},
                          {"answers", count_of((*server)->counters().answers)},
-                         {"cache_hits", count_of((*server)->counters().cache_hits)}});
+                         {"cache_hits", count_of((*server)->counters().cache_hits)},
+                         {"store_failures", count_of((*server)->counters().store_failures)},
+                         {"store_corrupt", count_of((*server)->counters().store_corrupt)}});
     return kExitDone;
 }
 

@@ -153,8 +153,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
         if (session_) {
             session_->end();
             const std::string& reason = session_->close_reason();
-            shared_.event("session of " + address_ + " \"" + session_->client_name() + "\" ended" +
-                          (reason.empty() ? "" : ": " + reason));
+            const std::string text = "session of " + address_ + " \"" + session_->client_name() +
+                                     "\" ended" + (reason.empty() ? "" : ": " + reason);
+            if (reason.starts_with(to_string(ErrorCode::malformed)) && shared_.options.on_fault) {
+                shared_.options.on_fault(text);
+            } else {
+                shared_.event(text);
+            }
         }
         shared_.admission.leave(address_);
         loop_.connections.erase(shared_from_this());
@@ -257,18 +262,61 @@ class Connection : public std::enable_shared_from_this<Connection> {
     std::optional<Clock::time_point> linger_until_;
 };
 
-/// Tells a client that there is no room, as far as that goes without waiting for it.
-void refuse(tcp::socket socket) {
-    const Bytes message = encode_message(
-        Failure{.request_id = 0,
-                .error = {.code = ErrorCode::busy, .message = "too many sessions are open"},
-                .retry_after_ms = 1000,
-                .key = std::nullopt});
-    error_code ignored;
-    socket.non_blocking(true, ignored);
-    socket.write_some(asio::buffer(message), ignored);
-    socket.shutdown(tcp::socket::shutdown_send, ignored);
-}
+/// Tells a client that there is no room, and then reads what it sends until it closes or kLinger is
+/// over: a socket closed on unread bytes takes the message back. On the loop's thread.
+class Refusal : public std::enable_shared_from_this<Refusal> {
+  public:
+    /// Refusals that linger at a time, over all loops; the others go at once.
+    static constexpr int kLingeringMax = 64;
+
+    Refusal(std::atomic<int>& lingering, tcp::socket socket)
+        : lingering_(lingering), socket_(std::move(socket)), timer_(socket_.get_executor()) {
+        ++lingering_;
+    }
+
+    ~Refusal() { --lingering_; }
+
+    Refusal(const Refusal&) = delete;
+    Refusal& operator=(const Refusal&) = delete;
+
+    void start() {
+        const Bytes message = encode_message(
+            Failure{.request_id = 0,
+                    .error = {.code = ErrorCode::busy, .message = "too many sessions are open"},
+                    .retry_after_ms = 1000,
+                    .key = std::nullopt});
+        error_code error;
+        socket_.non_blocking(true, error);
+        socket_.write_some(asio::buffer(message), error);
+        socket_.shutdown(tcp::socket::shutdown_send, error);
+        if (error || lingering_ > kLingeringMax) {
+            return;
+        }
+        timer_.expires_after(kLinger);
+        timer_.async_wait([self = shared_from_this()](error_code) {
+            error_code ignored;
+            self->socket_.close(ignored);
+        });
+        read();
+    }
+
+  private:
+    void read() {
+        socket_.async_read_some(asio::buffer(read_buffer_),
+                                [self = shared_from_this()](error_code error, std::size_t) {
+                                    if (error) {
+                                        self->timer_.cancel();
+                                        return;
+                                    }
+                                    self->read();
+                                });
+    }
+
+    std::atomic<int>& lingering_;
+    tcp::socket socket_;
+    asio::steady_timer timer_;
+    std::array<std::byte, kReadBytes> read_buffer_{};
+};
 
 }  // namespace
 
@@ -363,7 +411,9 @@ struct TcpListener::Impl {
         const std::string address = remote.address().to_string();
         if (!shared.admission.enter(address)) {
             shared.event("refused a session of " + address + ": too many are open");
-            refuse(std::move(socket));
+            asio::post(loop.context,
+                       [refusal = std::make_shared<Refusal>(
+                            lingering_refusals, std::move(socket))] { refusal->start(); });
             return;
         }
         const auto connection =
@@ -393,6 +443,7 @@ struct TcpListener::Impl {
     }
 
     Shared shared;
+    std::atomic<int> lingering_refusals = 0;  // before the loops, whose handlers count it down
     std::vector<std::unique_ptr<Loop>> loops;
     std::optional<tcp::acceptor> acceptor;
     std::optional<asio::steady_timer> retry;

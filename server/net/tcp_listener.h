@@ -29,6 +29,8 @@ struct ListenOptions {
     std::chrono::milliseconds tick{1'000};  ///< how often deadlines are looked at
     /// Told about each session's beginning and end, in a sentence; any thread; may be empty.
     std::function<void(std::string_view)> on_event;
+    /// Told as `on_event` is, instead of it, of sessions that ended because of malformed input.
+    std::function<void(std::string_view)> on_fault;
 };
 
 /// Calls from the owner's thread, but `sessions`: any.

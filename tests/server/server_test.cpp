@@ -257,6 +257,14 @@ TEST(Server, RefusesSessionsAboveItsLimits) {
         ASSERT_TRUE(failure);
         EXPECT_EQ(failure->error.code, ErrorCode::busy);
         EXPECT_TRUE(third.is_closed());
+        for (int i = 0; i < 20; ++i) {  // what it sends first must not take the answer away
+            RawClient hasty(r.port());
+            hasty.send(ClientHello{.protocol_version = kProtocolVersion,
+                                   .client_name = "hasty",
+                                   .token = {},
+                                   .formats = {}});
+            EXPECT_TRUE(hasty.next_as<Failure>());
+        }
     }
     while (r.server->sessions() > 0) {
         std::this_thread::yield();
