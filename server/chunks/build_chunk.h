@@ -41,7 +41,7 @@ struct BuildContext {
     /// Told about each record that could not be read, in a sentence; may be empty. Must not throw.
     std::function<void(std::string_view)> on_notice;
     /// Told about each read or write that the store refused; may be empty. Must not throw.
-    std::function<void(std::string_view)> on_store_failure;
+    std::function<void(std::string_view)> on_store_failure = {};
 };
 
 /// One worker's pipeline and its scratch buffers. Belongs to one thread.
