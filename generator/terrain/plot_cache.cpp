@@ -2,6 +2,8 @@
 
 #include "generator/terrain/random.h"
 
+#include <utility>
+
 namespace terrane {
 
 std::size_t PlotCache::PlotHash::operator()(const PlotPos& plot) const {
@@ -16,17 +18,21 @@ void PlotCache::trim() {
 }
 
 std::vector<PlottedElement>& PlotCache::get(const World& world, PlotPos plot) {
-    const auto [place, is_new] = plots_.try_emplace(plot);
-    std::vector<PlottedElement>& elements = place->second;
-    if (is_new) {
-        draw_plot(drawn_, world, plot);
-        elements.reserve(drawn_.size());
-        for (const Element& element : drawn_) {
-            elements.push_back({.element = element, .shape = std::nullopt});
-        }
-        element_count_ += elements.size();
+    const auto known = plots_.find(plot);
+    if (known != plots_.end()) {
+        return known->second;
     }
-    return elements;
+    // Whole before it is kept: what throws half-way must not leave an empty plot behind.
+    draw_plot(drawn_, world, plot);
+    std::vector<PlottedElement> elements;
+    elements.reserve(drawn_.size());
+    for (const Element& element : drawn_) {
+        elements.push_back({.element = element, .shape = std::nullopt});
+    }
+    const std::size_t count = elements.size();
+    std::vector<PlottedElement>& kept = plots_.try_emplace(plot, std::move(elements)).first->second;
+    element_count_ += count;
+    return kept;
 }
 
 }  // namespace terrane
