@@ -33,6 +33,19 @@ Result<void> check_range(const ColumnRectangle& rectangle) {
     return {};
 }
 
+/// Ids are 16 bits, and the last one says "none" while columns are written. Only coarse levels of
+/// dense worlds come here: World::build bounds level 0.
+Result<void> check_elements(const Region& region, const World& world) {
+    static constexpr std::size_t kPaletteIdsMax = 65534;
+    const std::size_t ids = region.elements.size() + world.base_palette.size();
+    if (ids > kPaletteIdsMax) {
+        return fail(ErrorCode::too_large, "layers, veins and caves here are " +
+                                              std::to_string(ids) + ", at most " +
+                                              std::to_string(kPaletteIdsMax) + " are possible");
+    }
+    return {};
+}
+
 }  // namespace
 
 StackGenerator::StackGenerator(const World& world) : StackGenerator(world, chosen_row_kernels()) {}
@@ -58,6 +71,9 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     }
     build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
                  *kernels_);
+    if (auto checked = check_elements(buffers_->region, *world_); !checked) {
+        return checked;
+    }
     out.position = position;
     out.side = side;
     write_columns({.grid = out.columns,
@@ -74,6 +90,9 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
     }
     build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
                  *kernels_);
+    if (auto checked = check_elements(buffers_->region, *world_); !checked) {
+        return checked;
+    }
     write_columns({.grid = out.columns,
                    .palette = out.palette,
                    .highest_y256 = out.highest_y256,

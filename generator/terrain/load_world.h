@@ -20,7 +20,7 @@ struct LoadedWorld {
 };
 
 /// Reads, checks and builds. What shows only when the world is built (a height bound above
-/// kHeightBoundMax) is a fault of the file's [terrain].
+/// kHeightBoundMax, more elements than kElementsPerRegionMax) is a fault of the file's [terrain].
 LoadedWorld load_world(const std::filesystem::path& path);
 
 /// The same for text already read; see parse_world_file.

@@ -1,11 +1,29 @@
 #include "generator/terrain/world.h"
 
+#include "generator/terrain/noise.h"
 #include "generator/world/world_file.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
 namespace terrane {
+namespace {
+
+/// What no region of level 0 exceeds: the plots that can reach into the largest one, with the most
+/// elements that a plot draws.
+double elements_per_region_bound(const WorldDefinition& definition, const LayerStack& stack) {
+    if (stack.gap_count() == 0) {
+        return 0;
+    }
+    const double area = std::max(definition.terrain.vein_area, definition.terrain.cave_area);
+    const double plots = (kRectangleSideMax + area) / definition.grid.plot + 2;
+    const double a_plot = 1.5 * (stack.reference_veins + stack.reference_caves) + 2;
+    return plots * plots * a_plot;
+}
+
+}  // namespace
 
 Result<World> World::build(WorldDefinition definition) {
     auto stack = build_layer_stack(definition);
@@ -17,6 +35,15 @@ Result<World> World::build(WorldDefinition definition) {
                     "the terrain can rise to " + std::to_string(stack->height_bound) +
                         " voxels, at most " + std::to_string(kHeightBoundMax) +
                         " are allowed: lower depth, roughness or the thicknesses");
+    }
+    const double elements = elements_per_region_bound(definition, *stack);
+    if (!(elements <= kElementsPerRegionMax)) {
+        return fail(ErrorCode::invalid_argument,
+                    "a chunk could meet " + std::to_string(std::llround(elements)) +
+                        " veins and caves, at most " +
+                        std::to_string(std::llround(kElementsPerRegionMax)) +
+                        " are allowed: lower vein_density, cave_density or the areas, or raise "
+                        "grid.plot");
     }
     World world;
     for (const Layer& layer : stack->layers) {

@@ -17,6 +17,10 @@
 
 namespace terrane {
 
+/// How many veins and caves one region may meet at level 0. Ids of a stack's palette are 16 bits;
+/// this leaves room, and bounds the time that a stack takes.
+inline constexpr double kElementsPerRegionMax = 16384;
+
 struct World {
     WorldDefinition definition;
     LayerStack stack;
@@ -25,8 +29,9 @@ struct World {
 
     std::uint16_t void_id() const { return static_cast<std::uint16_t>(stack.layers.size()); }
 
-    /// Fails with `invalid_argument` if the definition admits no first layer, or if its height
-    /// bound is above kHeightBoundMax.
+    /// Fails with `invalid_argument` if the definition admits no first layer, if its height bound
+    /// is above kHeightBoundMax, or if a region could meet more than kElementsPerRegionMax
+    /// elements.
     static Result<World> build(WorldDefinition definition);
 };
 
