@@ -34,7 +34,8 @@ Result<ChunkContent> read_columns(const ChunkAnswer& answer, std::span<const std
     if (!chunk_bytes) {
         return tl::unexpected(chunk_bytes.error());
     }
-    auto chunk = decode_chunk(*chunk_bytes);
+    auto chunk = decode_chunk(*chunk_bytes,
+                              std::clamp<std::size_t>(world.materials.size(), 1, kMaterialsMax));
     if (!chunk) {
         return tl::unexpected(chunk.error());
     }

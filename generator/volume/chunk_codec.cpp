@@ -65,7 +65,10 @@ ColumnsLayout stack_layout(std::int32_t side) {
 /// Reads heads; the first fault is kept, and everything after it reads as 0.
 class RecordReader {
   public:
-    explicit RecordReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
+    RecordReader(std::span<const std::byte> bytes, std::size_t materials_max)
+        : bytes_(bytes), reader_(bytes), materials_max_(materials_max) {
+        TERRANE_ASSERT(materials_max >= 1 && materials_max <= kMaterialsMax);
+    }
 
     bool ok() const { return !error_; }
 
@@ -116,15 +119,15 @@ class RecordReader {
         PaletteEntry made;
         const unsigned head = byte();
         const unsigned shares = head >> 3U;
-        if (shares > kCompositionMaterialsMax) {
-            refuse(ErrorCode::malformed, "palette: more materials than a composition has");
+        if (shares == 0 || shares > kCompositionMaterialsMax) {
+            refuse(ErrorCode::malformed, "palette: a composition has 1 to 6 materials");
             return made;
         }
         made.kind = static_cast<PaletteKind>(head & 3U);
         made.alone = (head & 4U) != 0;
         for (unsigned i = 0; i < shares && ok(); ++i) {
             const std::uint64_t material =
-                count(kMaterialsMax - 1, "palette: a material's index is above 255");
+                count(materials_max_ - 1, "palette: a material that the world does not have");
             const double concentration = f64();
             if (!(concentration > 0 && concentration <= 1)) {  // a NaN is neither
                 refuse(ErrorCode::malformed, "palette: a concentration is not within 0..1");
@@ -173,6 +176,7 @@ class RecordReader {
         out.width = layout.width;
         out.length = layout.length;
         out.x_first = out.z_first = -layout.apron;
+        check_heights(out, layout);
         const std::size_t written = bytes_.size() - reader_.remaining();
         const std::size_t least = std::max(written, least_bytes(out.limits.size()));
         const auto padding = reader_.take(reader_.remaining());
@@ -189,8 +193,23 @@ class RecordReader {
     }
 
   private:
+    /// What everything that walks a column relies on.
+    void check_heights(const ColumnGrid& columns, const ColumnsLayout& layout) {
+        const std::span limits = columns.limits;
+        for (std::size_t i = 0; i + 1 < columns.offsets.size(); ++i) {
+            const auto column =
+                limits.subspan(columns.offsets[i], columns.offsets[i + 1] - columns.offsets[i]);
+            if (column.empty() || !std::ranges::is_sorted(column, {}, &Limit::y256)) {
+                refuse(ErrorCode::malformed, "columns: one is empty or its heights fall");
+            } else if (layout.apron > 0 && column.front().y256 != 0) {
+                refuse(ErrorCode::malformed, "columns: a stack's does not begin at 0");
+            }
+        }
+    }
+
     std::span<const std::byte> bytes_;
     ByteReader reader_;
+    std::size_t materials_max_;
     std::optional<Error> error_;
 };
 
@@ -224,6 +243,29 @@ std::int32_t read_side(RecordReader& in, std::int32_t most) {
     return static_cast<std::int32_t>(side);
 }
 
+/// Layers, one void, then elements.
+bool is_stack_palette(const Palette& palette) {
+    const auto is_layer = [](const PaletteEntry& e) { return e.kind == PaletteKind::layer; };
+    const auto is_element = [](const PaletteEntry& e) {
+        return e.kind == PaletteKind::vein || e.kind == PaletteKind::cave;
+    };
+    const auto nothing = std::ranges::find_if_not(palette, is_layer);
+    return nothing != palette.begin() && nothing != palette.end() &&
+           nothing->kind == PaletteKind::void_ &&
+           std::all_of(nothing + 1, palette.end(), is_element);
+}
+
+/// Of the inner columns, whose heights ascend.
+std::int32_t highest_limit(const Stack& stack) {
+    std::int32_t highest = 0;
+    for (std::int32_t z = 0; z < stack.side; ++z) {
+        for (std::int32_t x = 0; x < stack.side; ++x) {
+            highest = std::max(highest, stack.columns.column(x, z).back().y256);
+        }
+    }
+    return highest;
+}
+
 }  // namespace
 
 void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
@@ -252,8 +294,8 @@ void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
     put_columns(out, chunk.columns, chunk.palette, chunk_layout(chunk.side, with_flow));
 }
 
-Result<Chunk> decode_chunk(std::span<const std::byte> bytes) {
-    RecordReader in(bytes);
+Result<Chunk> decode_chunk(std::span<const std::byte> bytes, std::size_t materials_max) {
+    RecordReader in(bytes, materials_max);
     const Head head = read_head(in);
     if (head.kind == RecordKind::stack) {
         in.refuse(ErrorCode::malformed, "record: a stack, not a chunk");
@@ -293,8 +335,8 @@ void encode_stack(Bytes& out, const Stack& stack) {
     put_columns(out, stack.columns, stack.palette, stack_layout(stack.side));
 }
 
-Result<Stack> decode_stack(std::span<const std::byte> bytes) {
-    RecordReader in(bytes);
+Result<Stack> decode_stack(std::span<const std::byte> bytes, std::size_t materials_max) {
+    RecordReader in(bytes, materials_max);
     const Head head = read_head(in);
     if (head.kind != RecordKind::stack || !head.with_flow) {
         in.refuse(ErrorCode::malformed, "record: a chunk, not a stack");
@@ -306,7 +348,13 @@ Result<Stack> decode_stack(std::span<const std::byte> bytes) {
     stack.side = read_side(in, kChunkSideMax);
     stack.highest_y256 = in.int32();
     stack.palette = in.palette();
+    if (!is_stack_palette(stack.palette)) {
+        in.refuse(ErrorCode::malformed, "palette: a stack's is layers, one void, elements");
+    }
     in.columns(stack.columns, stack.palette, stack_layout(stack.side));
+    if (in.ok() && highest_limit(stack) != stack.highest_y256) {
+        in.refuse(ErrorCode::malformed, "record: its highest limit is another one");
+    }
     if (!in.ok()) {
         return in.failure();
     }

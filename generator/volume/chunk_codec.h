@@ -30,14 +30,21 @@ inline constexpr std::size_t kLimitsPerByteMax = 32;
 /// `out` is overwritten. The bytes are a pure function of the chunk; with the flow they are what
 /// `terrane verify` hashes, and they are what COLUMNS payloads carry (before zstd). Needs what
 /// cut_chunk gives: columns 0..N-1 (none if uniform), palette positions in range, ascending stack
-/// ids; the limits themselves may be anything.
+/// ids, limits of ascending or equal heights in every column.
 void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow = FlowPlane::with);
 
-/// Every length and id is checked; fails with `malformed`, `too_large` or `version_mismatch`.
-Result<Chunk> decode_chunk(std::span<const std::byte> bytes);
+/// Every length and id is checked, and all that readers of a chunk rely on: each column has a limit
+/// and heights that do not fall, each composition 1 to 6 materials below `materials_max` (1..256,
+/// the world's number). Fails with `malformed`, `too_large` or `version_mismatch`.
+Result<Chunk> decode_chunk(std::span<const std::byte> bytes,
+                           std::size_t materials_max = kMaterialsMax);
 
 /// A whole stack with its apron (columns -1..N), flow included, for the store.
 void encode_stack(Bytes& out, const Stack& stack);
-Result<Stack> decode_stack(std::span<const std::byte> bytes);
+
+/// The same; further, columns begin at 0, the palette is layers, one void, elements, and
+/// highest_y256 is what it says.
+Result<Stack> decode_stack(std::span<const std::byte> bytes,
+                           std::size_t materials_max = kMaterialsMax);
 
 }  // namespace terrane

@@ -182,7 +182,8 @@ bool decode_table(SignatureTable& table, ByteReader& in, const RunBounds& bounds
     }
     for (std::uint64_t i = 0; i < *count; ++i) {
         const auto slots = in.varint();
-        if (!slots || *slots > in.remaining()) {  // a slot is at least a byte
+        if (!slots || *slots == 0 || *slots > in.remaining() ||  // a slot is at least a byte
+            table.palette_ids.size() + *slots > bounds.limits_max) {
             return false;
         }
         for (std::uint64_t slot = 0; slot < *slots; ++slot) {
@@ -308,7 +309,7 @@ bool decode_runs(SignatureRuns& runs, ByteReader& in, const RunBounds& bounds) {
             x += run.length;
         }
     }
-    return true;
+    return next_new == runs.table.size();  // a signature that no run uses only takes memory
 }
 
 }  // namespace terrane

@@ -172,7 +172,7 @@ std::shared_ptr<const Stack> ChunkBuilder::stored_stack(StackPos position) {
     if (!bytes) {
         return nullptr;
     }
-    auto stack = decode_stack(*bytes);
+    auto stack = decode_stack(*bytes, context_.world->definition.materials.size());
     if (stack &&
         (stack->position != position || stack->side != context_.world->definition.grid.side)) {
         stack = fail(ErrorCode::corrupt, "it is another stack's");

@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <limits>
@@ -71,6 +72,32 @@ void expect_round_trip(const Stack& stack) {
     EXPECT_EQ(*decoded, stack);
 }
 
+/// Every column ascends from 0, and the stack knows its highest limit.
+void put_heights_in_order(Stack& stack) {
+    ColumnGrid& columns = stack.columns;
+    stack.highest_y256 = 0;
+    for (std::int32_t z = -1; z <= stack.side; ++z) {
+        for (std::int32_t x = -1; x <= stack.side; ++x) {
+            const std::size_t i = columns.index_of(x, z);
+            const auto column =
+                std::span(columns.limits)
+                    .subspan(columns.offsets[i], columns.offsets[i + 1] - columns.offsets[i]);
+            std::vector<std::int32_t> heights;
+            for (const Limit& limit : column) {
+                heights.push_back(limit.y256);
+            }
+            std::ranges::sort(heights);
+            heights.front() = 0;
+            for (std::size_t k = 0; k < column.size(); ++k) {
+                column[k].y256 = heights[k];
+            }
+            if (x >= 0 && x < stack.side && z >= 0 && z < stack.side) {
+                stack.highest_y256 = std::max(stack.highest_y256, heights.back());
+            }
+        }
+    }
+}
+
 /// A small stack that has blends, elements, a cave, an overlap and a hole.
 Stack varied_stack() {
     Stack stack = drawn_stack(4, {"aabb#bcc", "aaabbAccc", "aabBBb.c", "aa", "abc", "aabbbbA#cc"});
@@ -78,6 +105,7 @@ Stack varied_stack() {
     for (Limit& limit : stack.columns.limits) {
         limit.y256 += static_cast<std::int32_t>(random() % 40);
     }
+    put_heights_in_order(stack);
     return stack;
 }
 
@@ -168,8 +196,8 @@ TEST(ChunkCodec, AnyLimitsComeBack) {
         std::vector<std::vector<Limit>> columns(1 + number(60));
         for (std::vector<Limit>& column : columns) {
             std::uint32_t y = 0;
-            for (std::uint32_t i = wild ? 0 : 1; i <= number(limits_most + 1); ++i) {
-                y = wild ? static_cast<std::uint32_t>(random()) : y + number(700);
+            for (std::uint32_t i = 0; i <= number(limits_most + 1); ++i) {
+                y = wild ? static_cast<std::uint32_t>(random()) >> 1U : y + number(700);
                 const auto part = [&] { return static_cast<std::int8_t>(random()); };
                 column.push_back({.y256 = static_cast<std::int32_t>(y),
                                   .palette_id = static_cast<std::uint16_t>(number(7)),
@@ -180,7 +208,7 @@ TEST(ChunkCodec, AnyLimitsComeBack) {
         for (Limit& limit : stack.columns.limits) {
             limit.flow.y = number(9) == 0 ? std::int8_t{-128} : limit.flow.y;
         }
-        stack.highest_y256 = static_cast<std::int32_t>(random());
+        put_heights_in_order(stack);
         expect_round_trip(stack);
         Chunk chunk;
         chunk.position = {.lod = 3, .x = kLeast, .y = kMost, .z = kLeast};
@@ -199,11 +227,19 @@ TEST(ChunkCodec, HeightsAtBothEndsOfInt32ComeBack) {
     for (int i = 0; i < 36; ++i) {
         const bool odd = i % 2 == 1;
         columns.push_back({{.y256 = odd ? kMost : kLeast, .palette_id = 0, .flow = {}},
-                           {.y256 = odd ? kLeast : kMost, .palette_id = 0, .flow = {}},
-                           {.y256 = odd ? 0 : kLeast, .palette_id = 1, .flow = {}},
-                           {.y256 = i % 3 == 0 ? kMost : -1, .palette_id = 1, .flow = {}}});
+                           {.y256 = odd ? kMost : kLeast, .palette_id = 0, .flow = {}},
+                           {.y256 = odd ? kMost : 0, .palette_id = 1, .flow = {}},
+                           {.y256 = odd || i % 3 == 0 ? kMost : 1, .palette_id = 1, .flow = {}}});
     }
-    expect_round_trip(stack_of_columns(4, columns));
+    Chunk chunk;
+    chunk.side = 6;
+    chunk.height = 64;
+    Stack stack = stack_of_columns(4, columns);
+    chunk.columns = stack.columns;
+    chunk.columns.x_first = chunk.columns.z_first = 0;
+    chunk.palette = stack.palette;
+    chunk.stack_palette_ids = {0, 1, 2, 3, 4, 5, 6};
+    expect_round_trip(chunk);
 }
 
 TEST(ChunkCodec, ManyLimitsInAColumnNeedNoCap) {
@@ -233,6 +269,20 @@ TEST(ChunkCodec, EveryTruncatedPrefixIsRefused) {
     }
 }
 
+void read_all(const Chunk& chunk) {
+    for (std::int32_t i = 0; i < chunk.side; ++i) {
+        EXPECT_GT(voxel_of(chunk, i, chunk.height - 1, i).count, 0);
+    }
+}
+
+void read_all(const Stack& stack) {
+    Chunk chunk;
+    for (std::int32_t y = -1; y < (stack.position.lod > 0 ? 0 : 3); ++y) {
+        cut_chunk(chunk, stack, stack.position.lod > 0 ? 0 : y, 3);
+        read_all(chunk);
+    }
+}
+
 TEST(ChunkCodec, EveryFlippedByteIsRefusedOrAnotherValidRecord) {
     const Stack stack = varied_stack();
     const auto flip_all = [](const Bytes& bytes, auto decode, auto encode) {
@@ -241,7 +291,8 @@ TEST(ChunkCodec, EveryFlippedByteIsRefusedOrAnotherValidRecord) {
                 Bytes changed = bytes;
                 changed[i] ^= static_cast<std::byte>(flip);
                 const auto decoded = decode(changed);
-                if (decoded) {  // then it is a record in its own right
+                if (decoded) {  // then it is a record in its own right, and safe to read
+                    read_all(*decoded);
                     const auto again = decode(encode(*decoded));
                     ASSERT_TRUE(again) << i << ' ' << flip;
                     EXPECT_EQ(*again, *decoded) << i << ' ' << flip;
@@ -280,6 +331,72 @@ TEST(ChunkCodec, WhatItRefusesItNames) {
     Bytes longer = good;
     longer.push_back(std::byte{0});
     EXPECT_FALSE(decode_chunk(longer));
+}
+
+TEST(ChunkCodec, WhatReadersRelyOnIsChecked) {
+    const auto refused = [](auto change) {
+        Stack stack = varied_stack();
+        change(stack);
+        const auto decoded = decode_stack(encoded(stack));
+        return !decoded && decoded.error().code == ErrorCode::malformed;
+    };
+    EXPECT_FALSE(refused([](Stack&) {}));
+    EXPECT_TRUE(refused([](Stack& stack) { ++stack.highest_y256; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.columns.limits[0].y256 = 1; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.columns.limits[1].y256 = -1; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.palette[2].composition = {}; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.palette[3].kind = PaletteKind::layer; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.palette[4].kind = PaletteKind::void_; }));
+    EXPECT_TRUE(refused([](Stack& stack) { stack.palette[0].kind = PaletteKind::vein; }));
+    Chunk falling = cut(varied_stack(), 1, 3);
+    falling.columns.limits[1].y256 = kLeast;
+    EXPECT_FALSE(decode_chunk(encoded(falling)));
+    Chunk bare = cut(varied_stack(), 1, 3);  // a column without any limit
+    const std::uint32_t taken = bare.columns.offsets[1];
+    bare.columns.limits.erase(bare.columns.limits.begin(), bare.columns.limits.begin() + taken);
+    for (std::size_t i = 1; i < bare.columns.offsets.size(); ++i) {
+        bare.columns.offsets[i] -= taken;
+    }
+    EXPECT_FALSE(decode_chunk(encoded(bare)));
+}
+
+TEST(ChunkCodec, MaterialsBeyondTheWorldsAreRefused) {
+    const Stack stack = varied_stack();  // materials 0..5
+    EXPECT_TRUE(decode_stack(encoded(stack), 6));
+    EXPECT_FALSE(decode_stack(encoded(stack), 5));
+    Chunk chunk;
+    chunk.side = chunk.height = 4;
+    chunk.uniform = true;
+    chunk.uniform_content.composition.add(5, 1.0);
+    EXPECT_TRUE(decode_chunk(encoded(chunk), 6));
+    EXPECT_FALSE(decode_chunk(encoded(chunk), 5));
+}
+
+TEST(ChunkCodec, ASignatureThatNoRunUsesIsRefused) {
+    Bytes good;
+    {
+        Chunk chunk;
+        chunk.side = 2;
+        chunk.height = 4;
+        chunk.palette.push_back(drawn_palette()[0]);
+        chunk.stack_palette_ids = {0};
+        chunk.columns.width = chunk.columns.length = 2;
+        chunk.columns.offsets = {0, 1, 2, 3, 4};
+        chunk.columns.limits.assign(4, {.y256 = 7, .palette_id = 0, .flow = {}});
+        good = encoded(chunk, FlowPlane::without);
+    }
+    ASSERT_TRUE(decode_chunk(good));
+    // ... 01 01 00: one signature of one limit; a second one is put behind it.
+    const std::array<std::byte, 3> table = {std::byte{1}, std::byte{1}, std::byte{0}};
+    const auto head = std::ranges::search(std::span(good).subspan(21), table);
+    ASSERT_FALSE(head.empty());
+    Bytes unused(good.data(), &*head.begin());
+    ByteWriter(unused).varint(2);
+    for (const unsigned value : {1U, 0U, 2U, 0U, 0U}) {
+        ByteWriter(unused).varint(value);
+    }
+    unused.insert(unused.end(), &*head.begin() + 3, good.data() + good.size());
+    EXPECT_FALSE(decode_chunk(unused));
 }
 
 TEST(ChunkCodec, ASmallRecordCannotAskForManyLimits) {
