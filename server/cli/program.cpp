@@ -1,5 +1,6 @@
 #include "server/cli/program.h"
 
+#include "generator/terrain/kernels/kernel_choice.h"
 #include "protocol/base/command_line.h"
 
 #include <CLI/CLI.hpp>
@@ -14,6 +15,10 @@ int run_program(int argc, char** argv) {
     app.require_subcommand(1);
     app.set_version_flag("--version", TERRANE_VERSION);
     app.set_help_all_flag("--help-all", "Print the help of every subcommand");
+    if (const auto kernels = kernel_set_from_environment(); !kernels) {
+        std::fprintf(stderr, "terrane: %s\n", kernels.error().message.c_str());
+        return kExitWrongUse;
+    }
     int exit_code = kExitDone;
     add_preseed_command(app, exit_code);
     add_serve_command(app, exit_code);

@@ -2,6 +2,7 @@
 #include "server/cli/verify.h"
 
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/kernels/kernel_choice.h"
 #include "generator/volume/chunk.h"
 #include "generator/volume/chunk_codec.h"
 #include "protocol/base/bytes.h"
@@ -95,8 +96,12 @@ int run_verify(const VerifyOptions& options) {
         std::fprintf(stderr, "terrane: interrupted; an area has no hash before its end\n");
         return kExitFailed;
     }
-    std::printf(options.as_json ? "{\"hash\":\"%s\",\"chunks\":%llu}\n" : "%s  %llu chunks\n",
-                to_hex(area->hash).c_str(), static_cast<unsigned long long>(area->chunks));
+    const auto kernels = kernel_set_from_environment();  // good: run_program looked at it
+    const std::string simd(kernels ? kernels->name : available_kernel_sets().back().name);
+    std::printf(options.as_json ? "{\"hash\":\"%s\",\"chunks\":%llu,\"simd\":\"%s\"}\n"
+                                : "%s  %llu chunks  %s\n",
+                to_hex(area->hash).c_str(), static_cast<unsigned long long>(area->chunks),
+                simd.c_str());
     return kExitDone;
 }
 
@@ -147,13 +152,15 @@ void add_verify_command(CLI::App& app, int& exit_code) {
     add_area_options(*verify, options->area);
     verify->add_option("--shuffle", options->shuffle_seed,
                        "Generate in the random order of this seed; the hash stays the same");
-    verify->add_flag("--json", options->as_json, "{\"hash\":\"..\",\"chunks\":..}");
+    verify->add_flag("--json", options->as_json, "{\"hash\":\"..\",\"chunks\":..,\"simd\":\"..\"}");
     verify->footer(
         "The hash is the sum mod 2^128, over every chunk of the area, of XXH3-128(key, chunk):\n"
         "the key is lod, x, y, z as little-endian int32, the chunk its bytes before compression.\n"
         "Of each stack all y count from 0 up to the chunk that holds the world's height bound\n"
         "('terrane world show' prints it), uniform chunks too. So the hash depends on the world,\n"
         "the area and the generator's version, never on workers, order or machine.\n"
+        "The last word names the inner loops that made it, by default the fastest that this\n"
+        "processor has; the environment's TERRANE_SIMD=scalar|sse2|avx2|avx512 forces one set.\n"
         "Example: terrane verify --world generator/worlds/basin.toml --rect -32,-32,32,32");
     verify->callback([options, &exit_code] { exit_code = run_verify(*options); });
 }

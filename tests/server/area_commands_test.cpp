@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,22 @@ TEST(VerifyCommand, TakesNegativeRectanglesInBothSpellings) {
     EXPECT_TRUE(apart.out.starts_with("{\"hash\":\"")) << apart.out;
     EXPECT_TRUE(apart.out.ends_with("}\n")) << apart.out;
     EXPECT_EQ(verify({"--rect=-1,-2,1,0", "--json", "--shuffle", "9"}).out, apart.out);
+}
+
+TEST(VerifyCommand, NamesItsInnerLoopsAndRefusesUnknownOnes) {
+    ::setenv("TERRANE_SIMD", "scalar", 1);
+    const Outcome text = verify({"--rect", "0,0,1,1"});
+    ::setenv("TERRANE_SIMD", "mmx", 1);
+    const Outcome unknown = verify({"--rect", "0,0,1,1"});
+    ::setenv("TERRANE_SIMD", "", 1);
+    const Outcome json = verify({"--rect", "0,0,1,1", "--json"});
+    ::unsetenv("TERRANE_SIMD");
+    EXPECT_TRUE(text.out.ends_with(" chunks  scalar\n")) << text.out;
+    EXPECT_EQ(unknown.exit_code, kExitWrongUse);
+    EXPECT_NE(unknown.err.find("TERRANE_SIMD=mmx"), std::string::npos) << unknown.err;
+    EXPECT_EQ(json.exit_code, kExitDone);
+    EXPECT_NE(json.out.find("\"simd\":\""), std::string::npos) << json.out;
+    EXPECT_TRUE(json.out.starts_with("{\"hash\":\"" + text.out.substr(0, 32))) << json.out;
 }
 
 TEST(VerifyCommand, RefusesBadAreasAndWorkersAsWrongUse) {

@@ -11,10 +11,11 @@ std::vector<KernelSet> find_kernel_sets() {
     std::vector<KernelSet> sets = {{"scalar", &kernels_scalar::kKernels}};
 #ifdef __x86_64__
     sets.push_back({"sse2", &kernels_sse2::kKernels});
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2")) {
+    // The sets are compiled for these levels as wholes (FMA, LZCNT, MOVBE.. included), so a
+    // processor or hypervisor that leaves out any part of one can't run them.
+    if (__builtin_cpu_supports("x86-64-v3")) {
         sets.push_back({"avx2", &kernels_avx2::kKernels});
-        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-            __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq")) {
+        if (__builtin_cpu_supports("x86-64-v4")) {
             sets.push_back({"avx512", &kernels_avx512::kKernels});
         }
     }
