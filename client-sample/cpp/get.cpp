@@ -252,12 +252,22 @@ Result<GetOptions> understood(const GetFlags& flags) {
     if (!address) {
         return fail(address.error().code, "--server: " + address.error().message);
     }
+    if (flags.lod < 0 || flags.lod > kLodMax) {
+        return fail(ErrorCode::invalid_argument,
+                    "--lod: there are levels 0 to " + std::to_string(kLodMax));
+    }
     options.host = address->host;
     options.port = address->port;
     for (const std::string& text : flags.at) {
         const auto chunk = parse_chunk(text, flags.lod);
         if (!chunk) {
             return fail(chunk.error().code, "--at: " + chunk.error().message);
+        }
+        if (chunk->lod > 0 && chunk->y != 0) {
+            return fail(ErrorCode::invalid_argument,
+                        "--at: '" + text +
+                            "': above level 0 a chunk has its columns' whole height, "
+                            "so y must be 0");
         }
         if (std::ranges::find(options.keys, *chunk) == options.keys.end()) {
             options.keys.push_back(*chunk);
@@ -291,7 +301,10 @@ void add_get_command(CLI::App& app, int& exit_code) {
     get->add_option("--server", flags->server, "Where the server listens")
         ->type_name("HOST:PORT")
         ->capture_default_str();
-    get->add_option("--lod", flags->lod, "Level of detail: every 2^L-th column")
+    get->add_option(
+           "--lod", flags->lod,
+           "Level of detail, 0..17: every 2^L-th column; above 0 a chunk is its columns' whole "
+           "height, and its y is 0")
         ->type_name("L")
         ->capture_default_str();
     get->add_option("--format", flags->format,

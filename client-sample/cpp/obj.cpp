@@ -1,5 +1,6 @@
 #include "client-sample/cpp/obj.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -17,8 +18,11 @@ double srgb_of(std::uint8_t linear) {
 template <typename... Values>
 void append_line(std::string& text, const char* format, Values... values) {
     std::array<char, 256> line{};
-    const int size = std::snprintf(line.data(), line.size(), format, values...);
-    text.append(line.data(), static_cast<std::size_t>(size));
+    // The length that the line wants, which may be more than fits: nothing here is near 256
+    // characters while voxels are at most 1000 m, and a cut line is better than foreign memory.
+    const int wanted = std::snprintf(line.data(), line.size(), format, values...);
+    text.append(line.data(),
+                std::min(static_cast<std::size_t>(std::max(wanted, 0)), line.size() - 1));
 }
 
 }  // namespace
@@ -47,8 +51,12 @@ std::string obj_of(const Mesh& mesh, ChunkPos key, const ServerHello& world) {
         const double x = static_cast<double>(n.x) / stretch;
         const double z = static_cast<double>(n.z) / stretch;
         const double length = std::sqrt(x * x + static_cast<double>(n.y * n.y) + z * z);
-        append_line(text, "vn %.4f %.4f %.4f\n", x / length, static_cast<double>(n.y) / length,
-                    z / length);
+        if (length > 0) {
+            append_line(text, "vn %.4f %.4f %.4f\n", x / length, static_cast<double>(n.y) / length,
+                        z / length);
+        } else {  // of no direction: up does no harm
+            text += "vn 0.0000 1.0000 0.0000\n";
+        }
     }
     const bool has_normals = mesh.normals.size() == mesh.vertex_count();
     for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {

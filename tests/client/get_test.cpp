@@ -1,5 +1,6 @@
 #include "client-sample/cpp/get.h"
 
+#include "client-sample/cpp/obj.h"
 #include "client-sample/cpp/program.h"
 #include "generator/mesh/draco_codec.h"
 #include "generator/volume/chunk_codec.h"
@@ -257,6 +258,26 @@ TEST_F(Get, WritesObjInWorldMetres) {
     EXPECT_EQ(faces, 2U);
 }
 
+TEST(Obj, ANormalOfNoLengthIsUpNotNan) {
+    Mesh mesh;
+    mesh.positions256.resize(1);
+    mesh.normals.resize(1);
+    mesh.normals[0] = {};
+    const std::string text = obj_of(mesh, {.lod = 0, .x = 0, .y = 0, .z = 0}, test_hello());
+    EXPECT_NE(text.find("vn 0.0000 1.0000 0.0000\n"), std::string::npos) << text;
+}
+
+TEST(Obj, ALineLongerThanItsRoomIsCut) {
+    auto hello = test_hello();
+    hello.voxel_size_m = 1e300;  // no server's: decoding refuses it
+    Mesh mesh;
+    mesh.positions256.resize(1);
+    mesh.positions256[0] = {256, 256, 256};
+    const std::string text = obj_of(mesh, {.lod = 0, .x = 1, .y = 1, .z = 1}, hello);
+    const std::size_t line = text.find("\nv ") + 1;
+    EXPECT_EQ(text.find('\n', line) - line, 255U);
+}
+
 TEST_F(Get, PrintsAnAlignedTable) {
     const ScriptedPeer peer(serving(square_at_ground));
     const auto outcome =
@@ -330,6 +351,9 @@ TEST_F(Get, WrongUseIsExitCode2) {
         {"get", "--at", "0,0,0", "--timeout", "0"},
         {"get", "--at", "0,0,0", "--timeout", "nan"},
         {"get", "--at", "0,0,0", "--obj", "--format", "columns"},
+        {"get", "--at", "0,0,0", "--lod", "-1"},
+        {"get", "--at", "0,0,0", "--lod", "18"},
+        {"get", "--at", "0,1,0", "--lod", "1"},
         {"get", "--at", "0,0,0", "--nonsense"},
         {"fetch"},
         {},
@@ -345,6 +369,7 @@ TEST_F(Get, HelpTeachesWithExamples) {
     const auto outcome = run({"get", "--help"});
     EXPECT_EQ(outcome.exit_code, 0);
     EXPECT_NE(outcome.out.find("terrane-client get --at -1,0,5"), std::string::npos);
+    EXPECT_NE(outcome.out.find("0..17"), std::string::npos);
 }
 
 TEST(GetFlags, AddressesHaveAHostAndMaybeAPort) {
