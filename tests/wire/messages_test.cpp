@@ -167,8 +167,9 @@ TEST(Messages, ColumnsFartherThan2To53AreOutOfRange) {
 }
 
 TEST(Messages, NumbersThatAreNotFiniteAreMalformed) {
-    for (const double value : {std::numeric_limits<double>::quiet_NaN(),
-                               std::numeric_limits<double>::infinity(), 0.0, -1.0}) {
+    for (const double value :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0.0,
+          -1.0, 0.0009, 1000.5}) {
         auto hello = std::get<ServerHello>(sample_messages()[1]);
         hello.voxel_size_m = value;
         EXPECT_EQ(code_of(decode(encode_message(hello))), ErrorCode::malformed) << value;
