@@ -130,7 +130,8 @@ Result<void> check_geometry(const wire::ServerHello& table) {
                    std::to_string(table.chunk_side()), " x ", std::to_string(table.chunk_height()),
                    " voxels, sides are 1..", std::to_string(kWireSideMax));
     }
-    if (!(table.voxel_size_m() >= kVoxelSizeMinM && table.voxel_size_m() <= kVoxelSizeMaxM) ||
+    if (!(table.voxel_size_m() >= kWireVoxelSizeMinM &&
+          table.voxel_size_m() <= kWireVoxelSizeMaxM) ||
         !std::isfinite(table.height_bound_voxels())) {
         return bad(ErrorCode::malformed,
                    "ServerHello: voxel size or height bound is not a usable number");
