@@ -92,8 +92,7 @@ void settle_chunk(GetRow& row, const ReceivedChunk& chunk, const Places& places,
     }
     if (options.obj && content->mesh) {
         const std::string text = obj_of(*content->mesh, row.key, world);
-        if (const auto written = write_file(places.obj_of(row.key), bytes_of(text));
-            !written) {
+        if (const auto written = write_file(places.obj_of(row.key), bytes_of(text)); !written) {
             row.error = written.error();
         }
     }

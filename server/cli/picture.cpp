@@ -1,9 +1,9 @@
 // terrane picture: the terrain as seen from somewhere.
+#include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/png.h"
 #include "server/cli/program.h"
-#include "protocol/base/write_file.h"
 #include "server/render/render_picture.h"
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // terrane report: the paper's tables and figures beside ours, on this machine.
-#include "server/cli/program.h"
 #include "protocol/base/write_file.h"
+#include "server/cli/program.h"
 #include "server/report/stopwatch.h"
 #include "server/report/write_report.h"
 

@@ -2,10 +2,10 @@
 
 #include "generator/terrain/generate_stack.h"
 #include "generator/volume/color.h"
+#include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
-#include "protocol/base/write_file.h"
 
 #include <CLI/CLI.hpp>
 

@@ -1,11 +1,11 @@
 // Generation: the paper's terrain extended online, against per-voxel Perlin noise of the same size.
+#include "generator/baseline/voxel_perlin.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/kernels/kernel_choice.h"
 #include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
 #include "generator/terrain/world.h"
 #include "tests/bench/bench_world.h"
-#include "generator/baseline/voxel_perlin.h"
 #include "tests/bench/ratios.h"
 
 #include <benchmark/benchmark.h>

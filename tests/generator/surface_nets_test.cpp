@@ -1,8 +1,7 @@
 #include "generator/mesh/surface_nets.h"
 
-#include "generator/volume/color.h"
-
 #include "generator/mesh/shade.h"
+#include "generator/volume/color.h"
 #include "tests/support/ascii_cut.h"
 #include "tests/support/drawn_worlds.h"
 #include "tests/support/mesh_audit.h"

@@ -1,8 +1,8 @@
 #include "server/cli/slice.h"
 
 #include "generator/terrain/generate_stack.h"
-#include "server/cli/program.h"
 #include "protocol/base/write_file.h"
+#include "server/cli/program.h"
 #include "tests/support/test_world.h"
 
 #include <gtest/gtest.h>
