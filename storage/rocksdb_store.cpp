@@ -94,11 +94,15 @@ class BackgroundErrors final : public rocksdb::EventListener {
 };
 
 /// Holds what is not to be destroyed, so that it is no leak in the eyes of a leak checker.
-void keep_for_ever(rocksdb::DB* db) {
+void keep_for_ever(rocksdb::DB* db, std::vector<rocksdb::ColumnFamilyHandle*> families) {
+    struct Kept {
+        rocksdb::DB* db;
+        std::vector<rocksdb::ColumnFamilyHandle*> families;
+    };
     static Mutex mutex;
-    static auto* const kept = new std::vector<rocksdb::DB*>;
+    static auto* const kept = new std::vector<Kept>;
     const MutexLock lock(mutex);
-    kept->push_back(db);
+    kept->push_back({.db = db, .families = std::move(families)});
 }
 
 /// An open database; closes column families before it.
@@ -123,7 +127,7 @@ struct Database {
             errors->silence();
         }
         if (db && is_broken()) {
-            keep_for_ever(db.release());
+            keep_for_ever(db.release(), std::move(families));
             return;
         }
         for (rocksdb::ColumnFamilyHandle* family : families) {
