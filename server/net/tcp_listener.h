@@ -30,7 +30,7 @@ struct ListenOptions {
     /// Told about each session's beginning and end, in a sentence; any thread; may be empty.
     std::function<void(std::string_view)> on_event;
     /// Told as `on_event` is, instead of it, of sessions that ended because of malformed input.
-    std::function<void(std::string_view)> on_fault;
+    std::function<void(std::string_view)> on_fault = {};
 };
 
 /// Calls from the owner's thread, but `sessions`: any.
