@@ -23,7 +23,9 @@ int write_all(const std::filesystem::path& path, const char* mode,
         return errno;
     }
     errno = 0;
-    const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+    // An empty span may have no address, and fwrite wants one.
+    const bool written =
+        bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
     const int write_error = errno;
     const bool closed = std::fclose(file) == 0;
     if (!written) {
