@@ -56,7 +56,7 @@ Result<void> check_request_id(std::uint32_t request_id, std::string_view what) {
 }
 
 Result<ChunkFormat> format_of(wire::Format format) {
-    if (format > wire::Format::MAX) {
+    if (format > wire::Format::DracoBlocky) {
         return bad(ErrorCode::unsupported, "format ", std::to_string(static_cast<int>(format)),
                    " is not known; 0 is draco, 1 is columns, 2 is blocky");
     }
