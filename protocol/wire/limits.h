@@ -1,6 +1,8 @@
 // The named limits of the native protocol; told in ServerHello where a client must know them.
 #pragma once
 
+#include "protocol/base/coords.h"
+
 #include <cstddef>
 #include <cstdint>
 
@@ -18,6 +20,11 @@ inline constexpr std::size_t kColumnChunkBytesMax = std::size_t{64} << 20U;
 inline constexpr std::size_t kKeysPerRequestMax = 64;
 inline constexpr std::size_t kKeysInFlightPerSessionMax = 1024;
 inline constexpr std::size_t kRequestsPerCancelMax = 1024;
+inline constexpr std::size_t kViewLevelsMax = static_cast<std::size_t>(kLodMax) + 1;
+inline constexpr float kFieldOfViewMax = 6.2831855F;    ///< 2 pi: all around
+inline constexpr std::size_t kKeysPerForgetMax = 4096;  ///< of one ChunkForget
+/// Chunk bytes of a view that may be sent and not yet credited, where nothing else is set.
+inline constexpr std::size_t kCreditWindowBytes = std::size_t{256} << 10U;
 
 inline constexpr std::size_t kWireNameBytesMax = 256;
 inline constexpr std::size_t kTokenBytesMax = 4096;

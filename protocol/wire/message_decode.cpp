@@ -179,7 +179,11 @@ Result<AnyMessage> read(const wire::ServerHello& table) {
         .limits = {.keys_per_request_max = table.limits()->keys_per_request_max(),
                    .keys_in_flight_max = table.limits()->keys_in_flight_max(),
                    .inbound_frame_bytes_max = table.limits()->inbound_frame_bytes_max(),
-                   .payload_bytes_max = table.limits()->payload_bytes_max()}};
+                   .payload_bytes_max = table.limits()->payload_bytes_max(),
+                   .view_radius_max = table.limits()->view_radius_max(),
+                   .credit_window_bytes = table.limits()->credit_window_bytes(),
+                   .requests_per_second_max = table.limits()->requests_per_second_max(),
+                   .bytes_per_second_max = table.limits()->bytes_per_second_max()}};
     for (std::size_t i = 0; i < size_of(table.materials()); ++i) {
         auto material =
             material_of(*table.materials()->Get(static_cast<flatbuffers::uoffset_t>(i)));
@@ -370,6 +374,83 @@ Result<AnyMessage> read(const wire::Goodbye& table) {
     return goodbye;
 }
 
+WireVector vector_of(const wire::Vector* vector) {
+    return vector == nullptr ? WireVector{}
+                             : WireVector{.x = vector->x(), .y = vector->y(), .z = vector->z()};
+}
+
+bool is_finite(WireVector vector) {
+    return std::isfinite(vector.x) && std::isfinite(vector.y) && std::isfinite(vector.z);
+}
+
+Result<void> check_view(const ViewUpdate& view) {
+    if (!std::isfinite(view.x) || !std::isfinite(view.y) || !std::isfinite(view.z) ||
+        !is_finite(view.direction) || !is_finite(view.velocity)) {
+        return bad(ErrorCode::invalid_argument,
+                   "ViewUpdate: position, direction and velocity must be finite numbers");
+    }
+    for (const double at : {view.x, view.y, view.z}) {
+        if (std::abs(at) >= static_cast<double>(kColumnCoordinateLimit)) {
+            return bad(ErrorCode::out_of_range, "ViewUpdate: the viewer at (",
+                       std::to_string(view.x), ", ", std::to_string(view.y), ", ",
+                       std::to_string(view.z), ") is not within 2^53 of the origin");
+        }
+    }
+    if (!(view.field_of_view >= 0 && view.field_of_view <= kFieldOfViewMax)) {
+        return bad(ErrorCode::invalid_argument, "ViewUpdate: a field of view of ",
+                   std::to_string(view.field_of_view), " radians, 0..2 pi are accepted");
+    }
+    return {};
+}
+
+Result<AnyMessage> read(const wire::ViewUpdate& table) {
+    const auto format = format_of(table.format());
+    if (!format) {
+        return bad(format.error().code, "ViewUpdate: ", format.error().message);
+    }
+    if (size_of(table.radius_chunks()) > kViewLevelsMax) {
+        return bad(ErrorCode::invalid_argument,
+                   "ViewUpdate: ", std::to_string(table.radius_chunks()->size()),
+                   " radii, one a level and at most ", std::to_string(kViewLevelsMax),
+                   " are accepted");
+    }
+    ViewUpdate view{.x = table.x(),
+                    .y = table.y(),
+                    .z = table.z(),
+                    .direction = vector_of(table.direction()),
+                    .field_of_view = table.field_of_view(),
+                    .velocity = vector_of(table.velocity()),
+                    .radius_chunks = {},
+                    .format = *format,
+                    .without_flow = table.without_flow(),
+                    .bytes_per_second_max = table.bytes_per_second_max()};
+    if (table.radius_chunks() != nullptr) {
+        view.radius_chunks.assign(table.radius_chunks()->begin(), table.radius_chunks()->end());
+    }
+    if (const auto checked = check_view(view); !checked) {
+        return tl::unexpected(checked.error());
+    }
+    return view;
+}
+
+Result<AnyMessage> read(const wire::ChunkForget& table) {
+    const std::size_t key_count = size_of(table.keys());
+    if (key_count == 0 || key_count > kKeysPerForgetMax) {
+        return bad(ErrorCode::malformed, "ChunkForget: ", std::to_string(key_count), " keys, 1..",
+                   std::to_string(kKeysPerForgetMax), " are possible");
+    }
+    ChunkForget forget;
+    forget.keys.reserve(key_count);
+    for (const wire::ChunkKey* key : *table.keys()) {
+        forget.keys.push_back(key_of(*key));
+    }
+    return forget;
+}
+
+Result<AnyMessage> read(const wire::Credit& table) {
+    return Credit{.bytes = table.bytes()};
+}
+
 Result<AnyMessage> read_body(const wire::Message& head) {
     switch (head.body_type()) {
         case wire::Body::ClientHello:
@@ -398,6 +479,12 @@ Result<AnyMessage> read_body(const wire::Message& head) {
             return read(*head.body_as_Pong());
         case wire::Body::Goodbye:
             return read(*head.body_as_Goodbye());
+        case wire::Body::ViewUpdate:
+            return read(*head.body_as_ViewUpdate());
+        case wire::Body::ChunkForget:
+            return read(*head.body_as_ChunkForget());
+        case wire::Body::Credit:
+            return read(*head.body_as_Credit());
         case wire::Body::NONE:
             break;
     }

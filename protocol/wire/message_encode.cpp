@@ -115,9 +115,10 @@ Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& h
     }
     const auto materials_at = builder.CreateVector(materials);
     const WireLimits& limits = hello.limits;
-    const auto limits_at =
-        wire::CreateLimits(builder, limits.keys_per_request_max, limits.keys_in_flight_max,
-                           limits.inbound_frame_bytes_max, limits.payload_bytes_max);
+    const auto limits_at = wire::CreateLimits(
+        builder, limits.keys_per_request_max, limits.keys_in_flight_max,
+        limits.inbound_frame_bytes_max, limits.payload_bytes_max, limits.view_radius_max,
+        limits.credit_window_bytes, limits.requests_per_second_max, limits.bytes_per_second_max);
     const auto server_version = text_of(builder, hello.server_version, kWireNameBytesMax);
     const auto world_name = text_of(builder, hello.world_name, kWireNameBytesMax);
     const wire::Hash fingerprint = wire_of(hello.fingerprint);
@@ -210,6 +211,32 @@ Offset<wire::Goodbye> write(FlatBufferBuilder& builder, const Goodbye& goodbye) 
     const auto code =
         goodbye.code ? static_cast<wire::FailureCode>(*goodbye.code) : wire::FailureCode::None;
     return wire::CreateGoodbye(builder, code, reason);
+}
+
+wire::Vector wire_of(WireVector vector) {
+    return {vector.x, vector.y, vector.z};
+}
+
+Offset<wire::ViewUpdate> write(FlatBufferBuilder& builder, const ViewUpdate& view) {
+    // More levels than a server takes may be written: tests send them.
+    const wire::Vector direction = wire_of(view.direction);
+    const wire::Vector velocity = wire_of(view.velocity);
+    const auto radius = view.radius_chunks.empty() ? 0 : builder.CreateVector(view.radius_chunks);
+    return wire::CreateViewUpdate(builder, view.x, view.y, view.z, &direction, view.field_of_view,
+                                  &velocity, radius, wire_of(view.format), view.without_flow,
+                                  view.bytes_per_second_max);
+}
+
+Offset<wire::ChunkForget> write(FlatBufferBuilder& builder, const ChunkForget& forget) {
+    TERRANE_ASSERT(forget.keys.size() <= kKeysPerForgetMax);
+    std::vector<wire::ChunkKey> keys;
+    std::ranges::transform(forget.keys, std::back_inserter(keys),
+                           [](ChunkPos key) { return wire_of(key); });
+    return wire::CreateChunkForget(builder, builder.CreateVectorOfStructs(keys));
+}
+
+Offset<wire::Credit> write(FlatBufferBuilder& builder, const Credit& credit) {
+    return wire::CreateCredit(builder, credit.bytes);
 }
 
 }  // namespace

@@ -45,9 +45,9 @@ std::string_view to_string(ChunkSource source) {
 std::string_view name_of(const AnyMessage& message) {
     // In the order of AnyMessage.
     constexpr std::array<std::string_view, std::variant_size_v<AnyMessage>> kNames = {
-        "ClientHello", "ServerHello", "ChunkRequest", "ChunkCancel",     "Chunk",
-        "ColumnQuery", "Column",      "WorldQuery",   "WorldDefinition", "Failure",
-        "Ping",        "Pong",        "Goodbye"};
+        "ClientHello", "ServerHello", "ChunkRequest",    "ChunkCancel", "Chunk", "ColumnQuery",
+        "Column",      "WorldQuery",  "WorldDefinition", "Failure",     "Ping",  "Pong",
+        "Goodbye",     "ViewUpdate",  "ChunkForget",     "Credit"};
     return kNames[message.index()];
 }
 

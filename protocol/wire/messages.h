@@ -66,6 +66,10 @@ struct WireLimits {
     std::uint32_t keys_in_flight_max = 0;
     std::uint32_t inbound_frame_bytes_max = 0;
     std::uint32_t payload_bytes_max = 0;
+    std::uint32_t view_radius_max = 0;          ///< of each level, in its chunk sides; 0: no views
+    std::uint32_t credit_window_bytes = 0;      ///< of a view's chunks, sent and not credited
+    std::uint32_t requests_per_second_max = 0;  ///< 0: no cap
+    std::uint64_t bytes_per_second_max = 0;     ///< 0: no cap
 
     friend bool operator==(const WireLimits&, const WireLimits&) = default;
 };
@@ -115,8 +119,8 @@ struct ChunkCancel {
     friend bool operator==(const ChunkCancel&, const ChunkCancel&) = default;
 };
 
-/// The head of a Chunk answer. `payload_bytes` follow it in the frame: more than 0 if and only if
-/// the status is full.
+/// The head of a Chunk answer; request_id 0: it belongs to the view. `payload_bytes` follow it in
+/// the frame: more than 0 if and only if the status is full.
 struct ChunkAnswer {
     std::uint32_t request_id = 0;
     ChunkPos key;
@@ -170,8 +174,9 @@ struct WorldAnswer {
     friend bool operator==(const WorldAnswer&, const WorldAnswer&) = default;
 };
 
-/// request_id 0: the whole session. With a key: that key of the request; without: all of the
-/// request that is not answered yet.
+/// request_id 0: with a key, that chunk of the view; without, the session or the last message that
+/// has no id. Another id: with a key, that key of the request; without, all of the request that is
+/// not answered yet.
 struct Failure {
     std::uint32_t request_id = 0;
     Error error{.code = ErrorCode::internal, .message = {}};
@@ -201,9 +206,46 @@ struct Goodbye {
     friend bool operator==(const Goodbye&, const Goodbye&) = default;
 };
 
-using AnyMessage =
-    std::variant<ClientHello, ServerHello, ChunkRequest, ChunkCancel, ChunkAnswer, ColumnQuery,
-                 ColumnAnswer, WorldQuery, WorldAnswer, Failure, Ping, Pong, Goodbye>;
+/// World axes, y up.
+struct WireVector {
+    float x = 0;
+    float y = 0;
+    float z = 0;
+
+    friend bool operator==(const WireVector&, const WireVector&) = default;
+};
+
+/// What the client wants to see from now on; terrane.fbs says which chunks that are.
+struct ViewUpdate {
+    double x = 0;  ///< the viewer, voxels of level 0; each within kColumnCoordinateLimit
+    double y = 0;
+    double z = 0;
+    WireVector direction;     ///< of any length; zero: nowhere in particular
+    float field_of_view = 0;  ///< whole angle, radians, 0..kFieldOfViewMax; 0: all around
+    WireVector velocity;      ///< voxels a second
+    std::vector<std::uint32_t> radius_chunks;  ///< one a level from 0, at most kViewLevelsMax
+    ChunkFormat format = ChunkFormat::draco;
+    bool without_flow = false;
+    std::uint64_t bytes_per_second_max = 0;  ///< 0: as fast as the server sends
+
+    friend bool operator==(const ViewUpdate&, const ViewUpdate&) = default;
+};
+
+struct ChunkForget {
+    std::vector<ChunkPos> keys;  ///< 1..kKeysPerForgetMax
+
+    friend bool operator==(const ChunkForget&, const ChunkForget&) = default;
+};
+
+struct Credit {
+    std::uint64_t bytes = 0;
+
+    friend bool operator==(const Credit&, const Credit&) = default;
+};
+
+using AnyMessage = std::variant<ClientHello, ServerHello, ChunkRequest, ChunkCancel, ChunkAnswer,
+                                ColumnQuery, ColumnAnswer, WorldQuery, WorldAnswer, Failure, Ping,
+                                Pong, Goodbye, ViewUpdate, ChunkForget, Credit>;
 
 /// The schema's name of the message, e.g. "ChunkRequest": for logs and errors.
 std::string_view name_of(const AnyMessage& message);
@@ -215,8 +257,8 @@ Bytes encode_message(const AnyMessage& message);
 
 /// A verified frame as a value. `malformed` means that the peer doesn't speak the protocol: close
 /// the connection. Every other code is about this one message (an unknown format is `unsupported`,
-/// 0 or more than 64 keys `invalid_argument`, a far column `out_of_range`): answer it with a
-/// Failure of `request_id_of` and go on.
+/// 0 or more than 64 keys or a view that isn't one `invalid_argument`, a far column or viewer
+/// `out_of_range`): answer it with a Failure of `request_id_of` and go on.
 Result<AnyMessage> decode_message(const Frame& frame);
 
 /// The request id in a frame's head, 0 if that kind of message has none: what a Failure about a

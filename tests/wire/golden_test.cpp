@@ -57,8 +57,27 @@ TEST(WireFormat, AChunkHasTheDocumentedBytes) {
     EXPECT_EQ(bytes, documented_frame("Chunk"));
 }
 
+TEST(WireFormat, AViewUpdateHasTheDocumentedBytes) {
+    const ViewUpdate view{.x = -10.5,
+                          .y = 70,
+                          .z = 4,
+                          .direction = {.x = 1, .y = 0, .z = 0},
+                          .field_of_view = 1.5F,
+                          .velocity = {.x = 50, .y = 0, .z = 0},
+                          .radius_chunks = {16, 16},
+                          .format = ChunkFormat::draco,
+                          .without_flow = false,
+                          .bytes_per_second_max = 0};
+    EXPECT_EQ(encode_message(view), documented_frame("ViewUpdate"));
+}
+
+TEST(WireFormat, AForgetAndACreditHaveTheDocumentedBytes) {
+    EXPECT_EQ(encode_message(ChunkForget{.keys = {kKey}}), documented_frame("ChunkForget"));
+    EXPECT_EQ(encode_message(Credit{.bytes = 65536}), documented_frame("Credit"));
+}
+
 TEST(WireFormat, TheDocumentedFramesDecode) {
-    for (const char* name : {"ChunkRequest", "Chunk"}) {
+    for (const char* name : {"ChunkRequest", "Chunk", "ViewUpdate", "ChunkForget", "Credit"}) {
         FrameReader reader(kOutboundFrameLimits);
         reader.feed(documented_frame(name));
         const auto frame = reader.next();

@@ -179,6 +179,87 @@ TEST(Messages, NumbersThatAreNotFiniteAreMalformed) {
     EXPECT_EQ(code_of(decode(encode_message(answer))), ErrorCode::malformed);
 }
 
+TEST(Messages, AViewHasFiniteNumbersAndAFieldOfView) {
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    for (const float value : {kNan, kInfinity, -kInfinity}) {
+        std::vector<ViewUpdate> views(9);
+        views[0].x = static_cast<double>(value);
+        views[1].y = static_cast<double>(value);
+        views[2].z = static_cast<double>(value);
+        views[3].direction.x = value;
+        views[4].direction.y = value;
+        views[5].direction.z = value;
+        views[6].velocity.x = value;
+        views[7].velocity.z = value;
+        views[8].field_of_view = value;
+        for (const ViewUpdate& view : views) {
+            EXPECT_EQ(code_of(decode(encode_message(view))), ErrorCode::invalid_argument);
+        }
+    }
+    for (const float angle : {-0.1F, -1e30F, 6.2832F, 7.0F}) {
+        ViewUpdate view;
+        view.field_of_view = angle;
+        EXPECT_EQ(code_of(decode(encode_message(view))), ErrorCode::invalid_argument) << angle;
+    }
+    ViewUpdate whole;
+    whole.field_of_view = kFieldOfViewMax;
+    EXPECT_TRUE(decode(encode_message(whole)));
+}
+
+TEST(Messages, AViewerIsWithin2To53OfTheOrigin) {
+    constexpr double kEnd = 9007199254740992.0;
+    for (const double far : {kEnd, -kEnd, 1e300, -1e300}) {
+        for (double ViewUpdate::* axis : {&ViewUpdate::x, &ViewUpdate::y, &ViewUpdate::z}) {
+            ViewUpdate view;
+            view.*axis = far;
+            EXPECT_EQ(code_of(decode(encode_message(view))), ErrorCode::out_of_range) << far;
+        }
+    }
+    ViewUpdate near;
+    near.x = kEnd - 1;
+    near.z = 1 - kEnd;
+    EXPECT_TRUE(decode(encode_message(near)));
+}
+
+TEST(Messages, AViewHasAtMostARadiusALevel) {
+    ViewUpdate view;
+    view.radius_chunks.assign(kViewLevelsMax, 4294967295U);
+    EXPECT_TRUE(decode(encode_message(view)));
+    view.radius_chunks.push_back(0);
+    EXPECT_EQ(code_of(decode(encode_message(view))), ErrorCode::invalid_argument);
+    const auto unknown_format = decode_built([](auto& builder) {
+        return std::pair(
+            wire::Body::ViewUpdate,
+            wire::CreateViewUpdate(builder, 0, 0, 0, 0, 0, 0, 0, static_cast<wire::Format>(200))
+                .Union());
+    });
+    EXPECT_EQ(code_of(unknown_format), ErrorCode::unsupported);
+}
+
+TEST(Messages, AForgetNamesSomeKeysButNotEndlesslyMany) {
+    EXPECT_TRUE(decode(encode_message(ChunkForget{.keys = std::vector<ChunkPos>(1)})));
+    EXPECT_TRUE(
+        decode(encode_message(ChunkForget{.keys = std::vector<ChunkPos>(kKeysPerForgetMax)})));
+    EXPECT_EQ(code_of(decode(encode_message(ChunkForget{}))), ErrorCode::malformed);
+    const auto many = decode_built([](auto& builder) {
+        const auto keys =
+            builder.CreateVectorOfStructs(std::vector<wire::ChunkKey>(kKeysPerForgetMax + 1));
+        return std::pair(wire::Body::ChunkForget, wire::CreateChunkForget(builder, keys).Union());
+    });
+    EXPECT_EQ(code_of(many), ErrorCode::malformed);
+}
+
+TEST(Messages, AViewIsWithinWhatAServerVerifies) {
+    ViewUpdate view = std::get<ViewUpdate>(sample_messages()[15]);
+    view.radius_chunks.assign(kViewLevelsMax, 1);
+    FrameReader reader(kInboundFrameLimits);
+    reader.feed(encode_message(view));
+    const auto frame = reader.next();
+    ASSERT_TRUE(frame && *frame);
+    EXPECT_TRUE(decode_message(**frame));
+}
+
 TEST(Messages, LongOrUnprintableClientNamesAreMalformed) {
     for (const std::string& name : {std::string(kWireNameBytesMax + 1, 'a'), std::string("a\nb")}) {
         const auto message = decode_built([&name](auto& builder) {
