@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 #include <limits>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -38,7 +39,7 @@ ChunkService::ChunkService(const ServiceOptions& options, ServiceCounters& count
       queue_(options.queued_jobs_max),
       in_flight_({.keys_max = options.keys_in_flight_max, .waiters_max = options.waiters_max}) {
     workers_.emplace(options.workers, queue_, [this, make_step = std::move(make_step)] {
-        return [this, step = make_step()](JobId job) { run_job(step, job); };
+        return [this, step = make_step()](const JobTurn& turn) { run_job(step, turn); };
     });
 }
 
@@ -66,15 +67,16 @@ Result<std::optional<Answer>> ChunkService::request(const WorkKey& wish, std::in
             return busy("too many requests are in flight");
         case InFlight::Admitted::joined_key:
             raise(counters_.joins);
-            queue_.raise(admission.job, admission.priority);
+            queue_.raise(admission.job, admission.claim);
             return std::optional<Answer>{};
         case InFlight::Admitted::joined_job:
-            queue_.raise(admission.job, admission.priority);
+            queue_.raise(admission.job, admission.claim);
             return std::optional<Answer>{};
         case InFlight::Admitted::new_job:
             break;
     }
-    if (queue_.push(admission.job, admission.priority)) {
+    if (queue_.push(admission.job, admission.claim)) {
+        claim_again(admission.job);
         return std::optional<Answer>{};
     }
     auto refused = busy("the work queue is full");
@@ -97,6 +99,25 @@ void ChunkService::cancel(const WorkKey& wish, WaiterId waiter) {
     }
     if (left.idle_job) {
         queue_.remove(*left.idle_job);
+    } else if (left.withdrawn && queue_.withdraw(left.withdrawn->job, left.withdrawn->claim.flow)) {
+        claim_again(left.withdrawn->job);
+    }
+}
+
+void ChunkService::change_priority(const WorkKey& wish, WaiterId waiter, std::int32_t priority) {
+    const auto key = checked(wish);
+    if (!key) {
+        return;
+    }
+    if (const auto changed = in_flight_.change(*key, waiter, priority)) {
+        queue_.change(changed->job, changed->claim);
+    }
+}
+
+/// The claims of those who joined before the job was queued. Who joins later finds it there.
+void ChunkService::claim_again(JobId job) {
+    for (const JobClaim& claim : in_flight_.claims_of(job)) {
+        queue_.raise(job, claim);
     }
 }
 
@@ -160,53 +181,81 @@ Result<WorkKey> ChunkService::checked(const WorkKey& key) const {
     return key;
 }
 
-void ChunkService::run_job(const BuildStep& step, JobId job) {
+void ChunkService::run_job(const BuildStep& step, const JobTurn& turn) {
     const auto start = Clock::now();
     std::size_t tasks = 0;
     while (tasks < kTasksPerTurnMax) {
-        const auto task = in_flight_.next(job);
+        const auto task = in_flight_.next(turn.job);
         if (!task) {
             break;
         }
-        run_task(step, *task);
+        if (!task->stop.stop_requested()) {
+            const auto answer = run_task(step, *task);
+            tell(in_flight_.finish(*task), answer);
+        }
         ++tasks;
     }
     if (tasks == kTasksPerTurnMax) {
-        queue_.put_back(job, in_flight_.priority_of(job));
+        put_back(turn.job);
     }
-    busy_us_.fetch_add(microseconds_since(start), std::memory_order_relaxed);
+    const std::uint64_t cost_us = microseconds_since(start);
+    queue_.charge(turn, cost_us);
+    busy_us_.fetch_add(cost_us, std::memory_order_relaxed);
     jobs_done_.fetch_add(1, std::memory_order_relaxed);
 }
 
-void ChunkService::run_task(const BuildStep& step, const Task& task) {
-    if (task.stop.stop_requested()) {
-        return;
+/// A job that can't be queued again for want of memory is given up; the worker goes on.
+void ChunkService::put_back(JobId job) {
+    try {
+        const auto claims = in_flight_.claims_of(job);
+        // Without a claim its last wishes have just been cancelled: it is looked at once more.
+        queue_.put_back(job, claims.empty() ? JobClaim{} : claims.front());
+        claim_again(job);
+    } catch (const std::exception&) {
+        queue_.remove(job);
+        tell(in_flight_.abandon(job), fail(ErrorCode::internal, "no memory"));
     }
+}
+
+/// One of the places where exceptions end: whatever is thrown fails this answer only.
+Result<Answer> ChunkService::run_task(const BuildStep& step, const Task& task) {
     const std::uint32_t queue_us = clamped_us(microseconds_since(task.asked));
-    Result<Answer> answer = fail(ErrorCode::internal, "no answer");
-    if (auto known = cached(task.key)) {  // finished between the asker's two looks
-        answer = *std::move(known);
-    } else {
-        answer = build(step, task);
-    }
-    if (answer) {
-        raise(counters_.answers);
-        if (auto* chunk = std::get_if<ServedChunk>(&*answer)) {
-            chunk->timings.queue_us = queue_us;
-            // Before the waiters are taken: who misses the table from here on finds the cache.
-            cache_.put(chunk->key, chunk->chunk, memory_bytes(*chunk->chunk));
+    auto known = cached(task.key);  // finished between the asker's two looks
+    auto answer = known ? Result<Answer>(*std::move(known)) : build(step, task);
+    if (!answer) {
+        if (answer.error().code != ErrorCode::cancelled) {
+            raise(counters_.failed);
         }
-    } else if (answer.error().code != ErrorCode::cancelled) {
-        raise(counters_.failed);
+        return answer;
     }
-    for (const Waiter& waiter : in_flight_.finish(task)) {
-        waiter.answer(answer);
+    raise(counters_.answers);
+    if (auto* chunk = std::get_if<ServedChunk>(&*answer)) {
+        chunk->timings.queue_us = queue_us;
+        // Before the waiters are taken: who misses the table from here on finds the cache.
+        try {
+            cache_.put(chunk->key, chunk->chunk, memory_bytes(*chunk->chunk));
+        } catch (const std::exception&) {  // no memory: who asks next has it made again
+        }
+    }
+    return answer;
+}
+
+/// A callback must only hand the answer on; one that finds no memory for that fails alone.
+void ChunkService::tell(const std::vector<Waiter>& waiters, const Result<Answer>& answer) {
+    for (const Waiter& waiter : waiters) {
+        try {
+            waiter.answer(answer);
+        } catch (const std::exception&) {
+            raise(counters_.failed);
+        }
     }
 }
 
 Result<Answer> ChunkService::build(const BuildStep& step, const Task& task) {
     try {
         return step(task);
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::internal, "no memory");  // short: the words need none
     } catch (const std::exception& error) {
         return fail(ErrorCode::internal, std::string("making the answer failed: ") + error.what());
     }

@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 namespace terrane {
 
@@ -49,13 +50,20 @@ class ChunkService {
 
     WaiterId new_waiter_id() { return next_waiter_.fetch_add(1, std::memory_order_relaxed); }
 
+    /// For a Waiter's `flow`: a name for a client, between which work is shared fairly.
+    FlowId new_flow_id() { return new_waiter_id(); }
+
     /// Three outcomes. An answer: it was in the cache, and `waiter.answer` is not called. Nothing:
     /// `waiter.answer` will be called once, unless `cancel` comes first. An error, and it is not
     /// called: `busy` (see retry_after_ms), `unsupported`, `out_of_range` or `draining`.
-    /// A higher priority is served sooner.
+    /// A higher priority is served sooner among those of one flow; from kNearPriority on, also
+    /// before what is not near of all others.
     Result<std::optional<Answer>> request(const WorkKey& key, std::int32_t priority, Waiter waiter);
     /// The waiter is not interested any more. An answer already on its way may still reach it.
     void cancel(const WorkKey& key, WaiterId waiter);
+    /// The waiter's interest has become another: higher or lower. Counts for all that its flow
+    /// wants of the key's stack. Does nothing if the waiter does not wait any more.
+    void change_priority(const WorkKey& key, WaiterId waiter, std::int32_t priority);
 
     /// How long until the queue may have room: its length times the mean job, 20..5,000 ms.
     std::uint32_t retry_after_ms() const;
@@ -75,9 +83,12 @@ class ChunkService {
 
   private:
     Result<WorkKey> checked(const WorkKey& key) const;
-    void run_job(const BuildStep& step, JobId job);
-    void run_task(const BuildStep& step, const Task& task);
+    void claim_again(JobId job);
+    void run_job(const BuildStep& step, const JobTurn& turn);
+    void put_back(JobId job);
+    Result<Answer> run_task(const BuildStep& step, const Task& task);
     Result<Answer> build(const BuildStep& step, const Task& task);
+    void tell(const std::vector<Waiter>& waiters, const Result<Answer>& answer);
     std::optional<Answer> cached(const WorkKey& key);
     tl::unexpected<Error> busy(const char* what);
 

@@ -9,6 +9,7 @@ namespace terrane {
 InFlight::Admission InFlight::admit(const WorkKey& key, StackPos stack, std::int32_t priority,
                                     Waiter waiter) {
     const auto now = std::chrono::steady_clock::now();
+    const FlowId flow = waiter.flow;
     const MutexLock lock(mutex_);
     if (waiters_ >= bounds_.waiters_max) {
         return {};
@@ -27,8 +28,7 @@ InFlight::Admission InFlight::admit(const WorkKey& key, StackPos stack, std::int
         id = place->second;
         if (is_new) {
             ++next_id_;
-            jobs_.emplace(id,
-                          Job{.stack = stack, .priority = priority, .taken = false, .pending = {}});
+            jobs_.emplace(id, Job{.stack = stack, .flows = {}, .taken = false, .pending = {}});
         }
         outcome = is_new ? Admitted::new_job : Admitted::joined_job;
         const TaskId task = next_id_++;
@@ -43,8 +43,14 @@ InFlight::Admission InFlight::admit(const WorkKey& key, StackPos stack, std::int
     // A key that runs while its job has been forgotten cannot be: a job lives as long as its keys
     // run.
     Job& job = jobs_.at(id);
-    job.priority = std::max(job.priority, priority);
-    return {.outcome = outcome, .job = id, .priority = job.priority};
+    auto wants = std::ranges::find(job.flows, flow, [](const Wants& w) { return w.claim.flow; });
+    if (wants == job.flows.end()) {
+        wants = job.flows.insert(
+            wants, Wants{.claim = {.flow = flow, .priority = priority}, .waiters = 0});
+    }
+    ++wants->waiters;
+    wants->claim.priority = std::max(wants->claim.priority, priority);
+    return {.outcome = outcome, .job = id, .claim = wants->claim};
 }
 
 std::optional<Task> InFlight::next(JobId id) {
@@ -71,10 +77,34 @@ std::optional<Task> InFlight::next(JobId id) {
     return task;
 }
 
-std::int32_t InFlight::priority_of(JobId id) const {
+std::vector<JobClaim> InFlight::claims_of(JobId id) const {
+    std::vector<JobClaim> claims;
     const MutexLock lock(mutex_);
-    const auto found = jobs_.find(id);
-    return found == jobs_.end() ? 0 : found->second.priority;
+    if (const auto found = jobs_.find(id); found != jobs_.end()) {
+        for (const Wants& wants : found->second.flows) {
+            claims.push_back(wants.claim);
+        }
+    }
+    return claims;
+}
+
+std::optional<InFlight::Claimed> InFlight::change(const WorkKey& key, WaiterId waiter,
+                                                  std::int32_t priority) {
+    const MutexLock lock(mutex_);
+    const auto found = entries_.find(key);
+    if (found == entries_.end()) {
+        return std::nullopt;
+    }
+    const auto& waiters = found->second.waiters;
+    const auto place = std::ranges::find(waiters, waiter, &Waiter::id);
+    if (place == waiters.end()) {
+        return std::nullopt;
+    }
+    const auto job = jobs_.find(found->second.job);
+    const auto wants = std::ranges::find(job->second.flows, place->flow,
+                                         [](const Wants& w) { return w.claim.flow; });
+    wants->claim.priority = priority;
+    return Claimed{.job = job->first, .claim = wants->claim};
 }
 
 std::vector<Waiter> InFlight::finish(const Task& task) {
@@ -103,15 +133,19 @@ InFlight::Left InFlight::leave(const WorkKey& key, WaiterId waiter) {
             return left;
         }
         left.found = true;
+        const JobId id = found->second.job;
+        const FlowId flow = place->flow;
         if (waiters.size() > 1) {
             gone.push_back(std::move(*place));
             waiters.erase(place);
             --waiters_;
+            if (drop_claim(id, flow)) {
+                left.withdrawn = {.job = id, .claim = {.flow = flow, .priority = 0}};
+            }
             return left;
         }
         left.stopped = true;
         stop = found->second.stop;
-        const JobId id = found->second.job;
         const TaskId task = found->second.task;
         gone = take_entry(key);
         const auto job = jobs_.find(id);
@@ -120,6 +154,10 @@ InFlight::Left InFlight::leave(const WorkKey& key, WaiterId waiter) {
             left.idle_job = id;
             job_of_stack_.erase(job->second.stack);
             jobs_.erase(job);
+        } else if (std::ranges::find(job->second.flows, flow, [](const Wants& w) {
+                       return w.claim.flow;
+                   }) == job->second.flows.end()) {
+            left.withdrawn = {.job = id, .claim = {.flow = flow, .priority = 0}};
         }
     }
     stop.request_stop();
@@ -164,9 +202,22 @@ std::size_t InFlight::size() const {
 std::vector<Waiter> InFlight::take_entry(const WorkKey& key) {
     const auto found = entries_.find(key);
     std::vector<Waiter> waiters = std::move(found->second.waiters);
+    for (const Waiter& waiter : waiters) {
+        drop_claim(found->second.job, waiter.flow);
+    }
     entries_.erase(found);
     waiters_ -= waiters.size();
     return waiters;
+}
+
+bool InFlight::drop_claim(JobId id, FlowId flow) {
+    auto& flows = jobs_.at(id).flows;
+    const auto wants = std::ranges::find(flows, flow, [](const Wants& w) { return w.claim.flow; });
+    if (--wants->waiters > 0) {
+        return false;
+    }
+    flows.erase(wants);
+    return true;
 }
 
 }  // namespace terrane

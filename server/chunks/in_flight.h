@@ -34,6 +34,7 @@ using WaiterId = std::uint64_t;
 struct Waiter {
     WaiterId id = 0;
     AnswerCallback answer;
+    FlowId flow = 0;  ///< whom it is for: work is shared fairly between flows
 };
 
 using TaskId = std::uint64_t;
@@ -65,7 +66,7 @@ class InFlight {
     struct Admission {
         Admitted outcome = Admitted::refused;
         JobId job = 0;
-        std::int32_t priority = 0;  ///< the job's, raised to that of its most urgent key
+        JobClaim claim;  ///< the flow's on the job, raised to that of its most urgent key
     };
 
     explicit InFlight(Bounds bounds) : bounds_(bounds) {}
@@ -74,18 +75,28 @@ class InFlight {
     /// The job's next pending work, oldest first. Nothing ends the job: it is forgotten in the same
     /// step, so a key that comes later opens a new one.
     std::optional<Task> next(JobId job);
-    /// The job's priority, for putting it back in the queue.
-    std::int32_t priority_of(JobId job) const;
+    /// Who wants the job and how urgently; empty if it is not known any more.
+    std::vector<JobClaim> claims_of(JobId job) const;
+
+    /// Gives the waiter's flow another claim on the key's job, and says which; nothing if the
+    /// waiter does not wait.
+    struct Claimed {
+        JobId job = 0;
+        JobClaim claim;
+    };
+
+    std::optional<Claimed> change(const WorkKey& key, WaiterId waiter, std::int32_t priority);
     /// Ends a task and gives its waiters; none if the task was stopped in the meantime.
     std::vector<Waiter> finish(const Task& task);
 
     /// Takes a waiter off. The last one to leave stops the work. Gives the job if it has become
     /// idle before any worker took it: the caller takes it out of the queue. `stopped` says whether
-    /// work was stopped.
+    /// work was stopped. `withdrawn`: the waiter's flow wants nothing of the job any more.
     struct Left {
         bool found = false;
         bool stopped = false;
         std::optional<JobId> idle_job;
+        std::optional<Claimed> withdrawn;
     };
 
     Left leave(const WorkKey& key, WaiterId waiter);
@@ -105,14 +116,21 @@ class InFlight {
         std::vector<Waiter> waiters;
     };
 
+    struct Wants {
+        JobClaim claim;
+        std::size_t waiters = 0;  ///< of this flow, for keys of this job; at least 1
+    };
+
     struct Job {
         StackPos stack;
-        std::int32_t priority = 0;
+        std::vector<Wants> flows;
         bool taken = false;  ///< a worker has asked for its work
         std::map<TaskId, WorkKey> pending;
     };
 
     std::vector<Waiter> take_entry(const WorkKey& key) TERRANE_REQUIRES(mutex_);
+    /// One waiter of the flow less; true if it was the flow's last on the job.
+    bool drop_claim(JobId job, FlowId flow) TERRANE_REQUIRES(mutex_);
 
     const Bounds bounds_;
     mutable Mutex mutex_;

@@ -55,8 +55,9 @@ class ShardedLru {
             shard.places.erase(last->key);
             forgotten.splice(forgotten.end(), shard.entries, last);
         }
-        shard.entries.push_front({.key = key, .value = std::move(value), .bytes = bytes});
-        shard.places.emplace(key, shard.entries.begin());
+        forgotten.push_front({.key = key, .value = std::move(value), .bytes = bytes});
+        shard.places.emplace(key, forgotten.begin());  // if this throws, nothing has been kept
+        shard.entries.splice(shard.entries.begin(), forgotten, forgotten.begin());
         shard.bytes += bytes;
     }
 

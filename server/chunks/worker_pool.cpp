@@ -27,8 +27,8 @@ WorkerPool::WorkerPool(std::size_t workers, WorkQueue& queue,
                     return;
                 }
                 is_ready.set_value();
-                while (const auto job = queue.pop()) {
-                    run_job(*job);
+                while (const auto turn = queue.pop()) {
+                    run_job(*turn);
                 }
             });
         }

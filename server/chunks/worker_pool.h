@@ -17,7 +17,7 @@ inline constexpr std::size_t kWorkersMax = 256;
 class WorkerPool {
   public:
     /// Does one job. Belongs to one thread, called there only; must not throw.
-    using RunJob = std::function<void(JobId)>;
+    using RunJob = std::function<void(const JobTurn&)>;
 
     /// `make_run_job` is called once on each worker's own thread. `workers` is 1..kWorkersMax.
     /// Returns when all are ready. If a thread can't be started or `make_run_job` throws, closes

@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <latch>
+#include <new>
 #include <thread>
 
 namespace terrane {
@@ -56,9 +58,20 @@ struct Fixture {
         service->stop();
     }
 
-    Result<std::optional<Answer>> request(const WorkKey& key, std::int32_t priority = 0) {
+    Result<std::optional<Answer>> request(const WorkKey& key, std::int32_t priority = 0,
+                                          FlowId flow = 0) {
         last_id = service->new_waiter_id();
-        return service->request(key, priority, {.id = last_id, .answer = inbox.callback()});
+        return service->request(key, priority,
+                                {.id = last_id, .answer = inbox.callback(), .flow = flow});
+    }
+
+    /// The x of the chunks that were answered, in that order.
+    std::vector<std::int32_t> answered(std::size_t count) {
+        std::vector<std::int32_t> order;
+        for (const auto& answer : inbox.wait(count)) {
+            order.push_back(answer ? std::get<ServedChunk>(*answer).key.position.x : -1);
+        }
+        return order;
     }
 
     const ServiceOptions options_;
@@ -214,6 +227,76 @@ TEST(ChunkService, ServesTheMoreUrgentFirst) {
         order.push_back(std::get<ServedChunk>(*answer).key.position.x);
     }
     EXPECT_EQ(order, (std::vector<std::int32_t>{1, 4, 4, 3, 2}));
+}
+
+TEST(ChunkService, SharesWorkersFairlyBetweenFlowsAndNearBeforeFar) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    for (std::int32_t x = 100; x < 200; ++x) {
+        ASSERT_TRUE(f.request(chunk(x), 8, 1));
+    }
+    ASSERT_TRUE(f.request(chunk(2), -8, 2));
+    ASSERT_TRUE(f.request(chunk(3), kNearPriority, 3));
+    f.gate.passes.release(103);
+    const auto order = f.answered(103);
+    EXPECT_EQ(order[1], 3) << "near, so before everybody's far chunks";
+    EXPECT_LT(std::ranges::find(order, 2) - order.begin(), 5) << "the other flow waits for 100";
+}
+
+TEST(ChunkService, APriorityCanBeChangedWhileItWaits) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2), 5));
+    const WaiterId second = f.last_id;
+    ASSERT_TRUE(f.request(chunk(3), 4));
+    ASSERT_TRUE(f.request(chunk(4), 3));
+    f.service->change_priority(chunk(4), f.last_id, 7);
+    f.service->change_priority(chunk(2), second, 1);
+    f.service->change_priority(chunk(2), 12345, 100);  // does not wait
+    f.gate.passes.release(4);
+    EXPECT_EQ(f.answered(4), (std::vector<std::int32_t>{1, 4, 3, 2}));
+}
+
+TEST(ChunkService, AJobIsServedForWhoIsLeftWhenItsMostUrgentLeaves) {
+    Fixture f({}, false);
+    ASSERT_TRUE(f.request(chunk(1)));
+    f.gate.begun.acquire();
+    ASSERT_TRUE(f.request(chunk(2), 9, 1));
+    const WaiterId urgent = f.last_id;
+    ASSERT_TRUE(f.request(chunk(2), 0, 2));
+    ASSERT_TRUE(f.request(chunk(3), 5, 2));
+    f.service->cancel(chunk(2), urgent);
+    EXPECT_EQ(count_of(f.counters.cancelled), 0U);
+    f.gate.passes.release(3);
+    EXPECT_EQ(f.answered(3), (std::vector<std::int32_t>{1, 3, 2}));
+}
+
+TEST(ChunkService, WantOfMemoryFailsOneTaskOnly) {
+    ServiceCounters counters;
+    Inbox inbox;
+    ChunkService service({}, counters, [] {
+        return [](const Task& task) -> Result<Answer> {
+            const auto key = std::get<ChunkKey>(task.key);
+            if (key.position.x == 1) {
+                throw std::bad_alloc();
+            }
+            return ServedChunk{.key = key,
+                               .chunk = std::make_shared<const EncodedChunk>(),
+                               .source = ChunkSource::generated,
+                               .timings = {}};
+        };
+    });
+    const auto ask = [&](std::int32_t x, AnswerCallback callback) {
+        return service.request(chunk(x), 0,
+                               {.id = service.new_waiter_id(), .answer = std::move(callback)});
+    };
+    ASSERT_TRUE(ask(1, inbox.callback()));
+    EXPECT_EQ(inbox.wait(1)[0].error().code, ErrorCode::internal);
+    ASSERT_TRUE(ask(2, [](const Result<Answer>&) { throw std::bad_alloc(); }));
+    ASSERT_TRUE(ask(3, inbox.callback()));
+    EXPECT_TRUE(inbox.wait(2)[1]) << "a callback that throws does not end the worker";
 }
 
 TEST(ChunkService, AStackWithManyWishesGivesWayToOthers) {

@@ -12,8 +12,9 @@ WorkKey chunk(std::int32_t x, std::int32_t y) {
 }
 
 InFlight::Admission admit(InFlight& table, const WorkKey& key, WaiterId waiter,
-                          std::int32_t priority = 0) {
-    return table.admit(key, stack_of(key, 32), priority, {.id = waiter, .answer = {}});
+                          std::int32_t priority = 0, FlowId flow = 0) {
+    return table.admit(key, stack_of(key, 32), priority,
+                       {.id = waiter, .answer = {}, .flow = flow});
 }
 
 constexpr InFlight::Bounds kRoomy{.keys_max = 100, .waiters_max = 100};
@@ -114,13 +115,36 @@ TEST(InFlight, RefusesAtItsBounds) {
     EXPECT_EQ(admit(waiters, chunk(0, 0), 3).outcome, Admitted::joined_key);
 }
 
-TEST(InFlight, AJobIsAsUrgentAsItsMostUrgentKey) {
+TEST(InFlight, AJobIsAsUrgentToAFlowAsItsMostUrgentKey) {
     InFlight table(kRoomy);
-    EXPECT_EQ(admit(table, chunk(0, 0), 1, -5).priority, -5);
-    EXPECT_EQ(admit(table, chunk(0, 1), 2, 7).priority, 7);
+    EXPECT_EQ(admit(table, chunk(0, 0), 1, -5).claim.priority, -5);
+    EXPECT_EQ(admit(table, chunk(0, 1), 2, 7).claim.priority, 7);
     const auto last = admit(table, chunk(0, 0), 3, 2);
-    EXPECT_EQ(last.priority, 7);
-    EXPECT_EQ(table.priority_of(last.job), 7);
+    EXPECT_EQ(last.claim.priority, 7);
+    const auto other = admit(table, chunk(0, 0), 4, 1, 9);
+    EXPECT_EQ(other.claim, (JobClaim{.flow = 9, .priority = 1}));
+    EXPECT_EQ(table.claims_of(last.job),
+              (std::vector<JobClaim>{{.flow = 0, .priority = 7}, {.flow = 9, .priority = 1}}));
+}
+
+TEST(InFlight, AFlowsInterestChangesAndEndsWithItsLastWaiter) {
+    InFlight table(kRoomy);
+    const auto job = admit(table, chunk(0, 0), 1, 5, 3).job;
+    admit(table, chunk(0, 1), 2, 5, 3);
+    admit(table, chunk(0, 0), 3, 0, 4);
+    const auto changed = table.change(chunk(0, 0), 1, -2);
+    ASSERT_TRUE(changed);
+    EXPECT_EQ(changed->job, job);
+    EXPECT_EQ(changed->claim, (JobClaim{.flow = 3, .priority = -2}));
+    EXPECT_FALSE(table.change(chunk(0, 0), 2, 1)) << "it waits for another key";
+    EXPECT_FALSE(table.change(chunk(7, 0), 1, 1));
+    EXPECT_FALSE(table.leave(chunk(0, 0), 1).withdrawn);
+    const auto left = table.leave(chunk(0, 1), 2);
+    ASSERT_TRUE(left.withdrawn);
+    EXPECT_EQ(left.withdrawn->claim.flow, 3U);
+    EXPECT_EQ(table.claims_of(job), (std::vector<JobClaim>{{.flow = 4, .priority = 0}}));
+    table.finish(*table.next(job));
+    EXPECT_TRUE(table.claims_of(job).empty());
 }
 
 TEST(InFlight, AbandoningAJobGivesAllItsWaiters) {

@@ -15,10 +15,10 @@ TEST(WorkerPool, ThrowsWhatAWorkerThrewWhileItWasMade) {
         if (made++ == 2) {
             throw std::runtime_error("no room for a worker");
         }
-        return [](JobId) {};
+        return [](const JobTurn&) {};
     };
     EXPECT_THROW(WorkerPool(4, queue, make_run_job), std::runtime_error);
-    EXPECT_FALSE(queue.push(1, 0)) << "the queue is closed, or the other three would wait";
+    EXPECT_FALSE(queue.push(1, {})) << "the queue is closed, or the other three would wait";
 }
 
 }  // namespace
