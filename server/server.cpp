@@ -5,6 +5,9 @@
 #include "protocol/wire/limits.h"
 #include "server/chunks/build_chunk.h"
 #include "server/chunks/store_identity.h"
+#include "server/http/core_routes.h"
+#include "server/http/problem.h"
+#include "server/net/native_protocol.h"
 #include "server/notice_limit.h"
 #include "storage/memory_store.h"
 #include "storage/rocksdb_store.h"
@@ -71,6 +74,23 @@ ServerHello hello_of(const World& world) {
     return hello;
 }
 
+constexpr const char* kNoRoom = "too many sessions are open";
+
+/// What a port says to a client for whom there is no room.
+Bytes native_refusal() {
+    return encode_message(Failure{.request_id = 0,
+                                  .error = {.code = ErrorCode::busy, .message = kNoRoom},
+                                  .retry_after_ms = 1000,
+                                  .key = std::nullopt});
+}
+
+Bytes http_refusal() {
+    const HttpResponse response = http_problem(Error{.code = ErrorCode::busy, .message = kNoRoom});
+    Bytes out = http_head(response, 0, false, http_date(std::chrono::system_clock::now()));
+    out.insert(out.end(), response.body->begin(), response.body->end());
+    return out;
+}
+
 }  // namespace
 
 MemoryBound memory_bound_of(const ServerOptions& options) {
@@ -133,7 +153,40 @@ struct Server::Impl {
           sessions{.service = &service,
                    .hello = hello_of(*world),
                    .world_file = canonical_world_file(world->definition),
-                   .timeouts = options.timeouts} {}
+                   .timeouts = options.timeouts},
+          routes{.service = &service,
+                 .world = world.get(),
+                 .hello = &sessions.hello,
+                 .world_file = sessions.world_file,
+                 .is_ready = [this] { return !draining.load(); },
+                 .metrics = [] { return std::string(); }},
+          router(sessions.hello.content_id),
+          http{.router = &router,
+               .counters = &http_counters,
+               .next_request_id = &next_request_id,
+               .timeouts = options.http_timeouts,
+               .websocket = {},
+               .requests_log = &log} {
+        add_chunk_routes(router, routes);
+        add_world_routes(router, routes);
+        add_state_routes(router, routes);
+        add_viewer_routes(router, options.viewer_files);
+    }
+
+    std::vector<ListenPort> ports(const ServerOptions& options) {
+        std::vector<ListenPort> out;
+        out.push_back({.name = "tcp",
+                       .endpoint = options.listen.endpoint,
+                       .make = native_protocol(sessions),
+                       .refusal = native_refusal()});
+        if (options.http) {
+            out.push_back({.name = "http",
+                           .endpoint = *options.http,
+                           .make = http_protocol(http),
+                           .refusal = http_refusal()});
+        }
+        return out;
+    }
 
     const Log& log;
     const std::shared_ptr<const World> world;
@@ -143,7 +196,14 @@ struct Server::Impl {
     StackCache stacks;
     ChunkService service;
     SessionContext sessions;
-    std::unique_ptr<TcpListener> listener;
+    std::atomic<bool> draining = false;
+    RouteContext routes;
+    Router router;
+    HttpCounters http_counters;
+    std::atomic<std::uint64_t> next_request_id = 1;
+    HttpContext http;
+    bool has_http = false;
+    std::unique_ptr<Listener> listener;
 };
 
 Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, const Log& log) {
@@ -171,7 +231,8 @@ Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, cons
             }
         };
     }
-    auto listener = TcpListener::open(listen, impl->sessions);
+    impl->has_http = options.http.has_value();
+    auto listener = Listener::open(listen, impl->ports(options));
     if (!listener) {
         return tl::unexpected(listener.error());
     }
@@ -186,7 +247,11 @@ Server::~Server() {
 }
 
 Endpoint Server::endpoint() const {
-    return impl_->listener->endpoint();
+    return impl_->listener->endpoint(0);
+}
+
+std::optional<Endpoint> Server::http_endpoint() const {
+    return impl_->has_http ? std::optional(impl_->listener->endpoint(1)) : std::nullopt;
 }
 
 const ServiceCounters& Server::counters() const {
@@ -201,6 +266,7 @@ void Server::stop(std::chrono::milliseconds drain_time) {
     if (!impl_->listener) {
         return;
     }
+    impl_->draining.store(true);
     if (!impl_->listener->drain(drain_time)) {
         impl_->log.warning("sessions that did not end in time are closed",
                            {{"sessions", std::uint64_t{impl_->listener->sessions()}}});

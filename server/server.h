@@ -1,17 +1,22 @@
-// A whole server: store, service, workers, listener. What `terrane serve` runs, and tests on port
-// 0.
+// A whole server: store, service, workers, routes, listener. What `terrane serve` runs, and tests
+// on port 0.
 #pragma once
 
 #include "generator/terrain/world.h"
 #include "protocol/base/result.h"
 #include "server/chunks/counters.h"
+#include "server/http/viewer_files.h"
 #include "server/log.h"
-#include "server/net/tcp_listener.h"
+#include "server/net/http_session.h"
+#include "server/net/listener.h"
+#include "server/net/session.h"
 
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <vector>
 
 namespace terrane {
 
@@ -23,7 +28,10 @@ inline constexpr std::chrono::milliseconds kDrainTime{10'000};
 struct ServerOptions {
     std::shared_ptr<const World> world;
     ListenOptions listen;
+    std::optional<Endpoint> http;  ///< none: no HTTP and no WebSocket
     SessionTimeouts timeouts;
+    HttpTimeouts http_timeouts;
+    std::vector<ViewerFile> viewer_files;
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;
@@ -58,8 +66,9 @@ class Server {
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
-    /// Where it listens.
+    /// Where it listens for the native protocol, and for HTTP if it does.
     Endpoint endpoint() const;
+    std::optional<Endpoint> http_endpoint() const;
     const ServiceCounters& counters() const;
     std::size_t sessions() const;
     /// Accepts no more, says goodbye, answers what is under way for at most `drain_time`, then

@@ -56,9 +56,9 @@ Result<void> check_request_id(std::uint32_t request_id, std::string_view what) {
 }
 
 Result<ChunkFormat> format_of(wire::Format format) {
-    if (format > wire::Format::DracoBlocky) {
+    if (format > wire::Format::Glb) {
         return bad(ErrorCode::unsupported, "format ", std::to_string(static_cast<int>(format)),
-                   " is not known; 0 is draco, 1 is columns, 2 is blocky");
+                   " is not known; 0 is draco, 1 is columns, 2 is blocky, 3 is glb");
     }
     return static_cast<ChunkFormat>(format);
 }

@@ -40,6 +40,7 @@ static_assert(static_cast<int>(ChunkFormat::draco) == static_cast<int>(wire::For
 static_assert(static_cast<int>(ChunkFormat::columns) == static_cast<int>(wire::Format::Columns));
 static_assert(static_cast<int>(ChunkFormat::draco_blocky) ==
               static_cast<int>(wire::Format::DracoBlocky));
+static_assert(static_cast<int>(ChunkFormat::glb) == static_cast<int>(wire::Format::Glb));
 static_assert(static_cast<int>(ChunkStatus::full) == static_cast<int>(wire::ChunkStatus::Full));
 static_assert(static_cast<int>(ChunkStatus::empty) == static_cast<int>(wire::ChunkStatus::Empty));
 static_assert(static_cast<int>(ChunkStatus::uniform) ==

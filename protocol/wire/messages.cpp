@@ -12,6 +12,8 @@ std::string_view to_string(ChunkFormat format) {
             return "columns";
         case ChunkFormat::draco_blocky:
             return "blocky";
+        case ChunkFormat::glb:
+            return "glb";
     }
     return "unknown";
 }

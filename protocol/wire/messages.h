@@ -21,7 +21,7 @@
 
 namespace terrane {
 
-enum class ChunkFormat : std::uint8_t { draco = 0, columns = 1, draco_blocky = 2 };
+enum class ChunkFormat : std::uint8_t { draco = 0, columns = 1, draco_blocky = 2, glb = 3 };
 enum class ChunkStatus : std::uint8_t { full = 0, empty = 1, uniform = 2, not_modified = 3 };
 enum class ChunkSource : std::uint8_t { generated = 0, store = 1, cache = 2 };
 

@@ -48,7 +48,13 @@ struct ServedColumn {
     std::shared_ptr<const std::vector<ColumnLimit>> limits;  ///< bottom first
 };
 
-using Answer = std::variant<ServedChunk, ServedColumn>;
+/// A file that is no chunk: a tile of 3D Tiles (GLB), a map or a section (PNG).
+struct ServedFile {
+    std::shared_ptr<const EncodedChunk> file;  ///< its status is `full`
+    ChunkSource source = ChunkSource::cache;
+};
+
+using Answer = std::variant<ServedChunk, ServedColumn, ServedFile>;
 /// Called once, on a worker's thread or the caller's: must only hand the answer on.
 using AnswerCallback = std::function<void(const Result<Answer>&)>;
 

@@ -1,12 +1,15 @@
 #include "server/chunks/build_chunk.h"
 
 #include "generator/mesh/draco_codec.h"
+#include "generator/mesh/glb.h"
 #include "generator/volume/chunk_codec.h"
 #include "protocol/base/check.h"
 #include "protocol/wire/column_payload.h"
 #include "protocol/wire/limits.h"
 #include "server/chunks/chunk_record.h"
 #include "server/chunks/store_identity.h"
+#include "server/render/map_tile.h"
+#include "server/render/section.h"
 
 #include <algorithm>
 #include <chrono>
@@ -37,6 +40,25 @@ tl::unexpected<Error> stopped() {
     return fail(ErrorCode::cancelled, "nobody waits for it any more");
 }
 
+RecordKey mesh_record_key(const ChunkKey& key) {
+    return {.family = Family::meshes,
+            .format = static_cast<std::uint8_t>(key.format),
+            .position = key.position};
+}
+
+/// A level's stack is one chunk, so a tile above level 0 is that chunk's record.
+RecordKey tile_record_key(const TileKey& key) {
+    constexpr std::uint8_t kLevel0Tile = 16;
+    constexpr std::uint8_t kCentredTile = 17;
+    const StackPos at = key.position;
+    const auto glb = static_cast<std::uint8_t>(ChunkFormat::glb);
+    return {.family = Family::meshes,
+            .format = key.centred   ? kCentredTile
+                      : at.lod == 0 ? kLevel0Tile
+                                    : glb,
+            .position = {.lod = at.lod, .x = at.x, .y = 0, .z = at.z}};
+}
+
 /// More than a column's message takes: FlatBuffers' tables, offsets and padding included.
 std::size_t head_bytes_of(const Stack& stack, std::span<const Limit> limits) {
     constexpr std::size_t kBesideBytes = 256;
@@ -48,6 +70,20 @@ std::size_t head_bytes_of(const Stack& stack, std::span<const Limit> limits) {
             kLimitBytes + kShareBytes * stack.palette[limit.palette_id].composition.shares().size();
     }
     return size_bytes;
+}
+
+std::shared_ptr<const EncodedChunk> file_of(Bytes bytes) {
+    EncodedChunk file;
+    file.status = ChunkStatus::full;
+    file.payload = std::make_shared<const Bytes>(std::move(bytes));
+    file.etag = etag_of(file);
+    return std::make_shared<const EncodedChunk>(std::move(file));
+}
+
+/// The least column of a square of one stack's size around column (0, 0).
+ColumnPos first_centred_column(std::int32_t lod, std::int32_t side) {
+    const std::int64_t half = (std::int64_t{side} << lod) / 2;
+    return {.x = -half, .z = -half};
 }
 
 /// No surface can be there: below the base, or above the highest world that is allowed.
@@ -78,14 +114,20 @@ Result<Answer> ChunkBuilder::build(const Task& task) {
     if (const auto* chunk = std::get_if<ChunkKey>(&task.key)) {
         return build_chunk(task, *chunk);
     }
-    return build_column(task, std::get<ColumnPos>(task.key));
+    if (const auto* column = std::get_if<ColumnPos>(&task.key)) {
+        return build_column(task, *column);
+    }
+    if (const auto* tile = std::get_if<TileKey>(&task.key)) {
+        return build_tile(task, *tile);
+    }
+    return build_picture(task);
 }
 
 Result<Answer> ChunkBuilder::build_chunk(const Task& task, const ChunkKey& key) {
     ServedChunk answer{.key = key, .chunk = nullptr, .source = ChunkSource::store, .timings = {}};
     const bool is_mesh = key.format != ChunkFormat::columns;
     if (is_mesh) {
-        if (auto known = stored_mesh(key)) {
+        if (auto known = stored_mesh(mesh_record_key(key))) {
             answer.chunk = std::move(known);
             return answer;
         }
@@ -108,10 +150,7 @@ Result<Answer> ChunkBuilder::build_chunk(const Task& task, const ChunkKey& key) 
     encoded->etag = etag_of(*encoded);
     answer.chunk = std::make_shared<const EncodedChunk>(*std::move(encoded));
     if (is_mesh) {
-        write_record({.family = Family::meshes,
-                      .format = static_cast<std::uint8_t>(key.format),
-                      .position = key.position},
-                     encode_chunk_record(*answer.chunk));
+        write_record(mesh_record_key(key), encode_chunk_record(*answer.chunk));
     }
     return answer;
 }
@@ -185,10 +224,7 @@ std::shared_ptr<const Stack> ChunkBuilder::stored_stack(StackPos position) {
     return std::make_shared<const Stack>(*std::move(stack));
 }
 
-std::shared_ptr<const EncodedChunk> ChunkBuilder::stored_mesh(const ChunkKey& chunk) {
-    const RecordKey key{.family = Family::meshes,
-                        .format = static_cast<std::uint8_t>(chunk.format),
-                        .position = chunk.position};
+std::shared_ptr<const EncodedChunk> ChunkBuilder::stored_mesh(const RecordKey& key) {
     const auto bytes = read_record(key);
     if (!bytes) {
         return nullptr;
@@ -264,7 +300,13 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
         return stopped();
     }
     const std::int32_t height_voxels = key.position.lod > 0 ? tile_height_voxels_ : grid.height + 1;
-    auto payload = encode_draco(mesh_, {.side = grid.side, .height_voxels = height_voxels});
+    const DracoSettings settings{.side = grid.side, .height_voxels = height_voxels};
+    auto payload = key.format == ChunkFormat::glb
+                       ? encode_glb(mesh_, settings,
+                                    glb_place_of(first_column_of(stack.position, grid.side),
+                                                 std::int64_t{key.position.y} * grid.height,
+                                                 key.position.lod, grid.voxel_size_m))
+                       : encode_draco(mesh_, settings);
     if (!payload) {
         return tl::unexpected(payload.error());
     }
@@ -275,6 +317,93 @@ Result<EncodedChunk> ChunkBuilder::encode_mesh(const Task& task, const ChunkKey&
     encoded.payload = std::make_shared<const Bytes>(*std::move(payload));
     timings.encode_us = clock.lap_us();
     return encoded;
+}
+
+Result<Answer> ChunkBuilder::build_tile(const Task& task, const TileKey& key) {
+    const RecordKey record = tile_record_key(key);
+    if (auto known = stored_mesh(record)) {
+        return ServedFile{.file = std::move(known), .source = ChunkSource::store};
+    }
+    StackInHand in_hand{.stack = nullptr, .generated = true};
+    if (!key.centred) {
+        auto stack = stack_for(task, key.position);
+        if (!stack) {
+            return tl::unexpected(stack.error());
+        }
+        in_hand = *std::move(stack);
+    }
+    if (auto made = make_tile_mesh(key, in_hand.stack.get()); !made) {
+        return tl::unexpected(made.error());
+    }
+    if (task.stop.stop_requested()) {
+        return stopped();
+    }
+    const Grid& grid = context_.world->definition.grid;
+    const std::int32_t lod = key.position.lod;
+    const ColumnPos first = key.centred ? first_centred_column(lod, grid.side)
+                                        : first_column_of(key.position, grid.side);
+    auto payload = encode_glb(mesh_, {.side = grid.side, .height_voxels = tile_height_voxels_},
+                              glb_place_of(first, 0, lod, grid.voxel_size_m));
+    if (!payload) {
+        return tl::unexpected(payload.error());
+    }
+    if (payload->size() > kPayloadBytesMax) {
+        return fail(ErrorCode::too_large, "tile of " + std::to_string(payload->size()) + " bytes");
+    }
+    auto file = file_of(*std::move(payload));
+    write_record(record, encode_chunk_record(*file));
+    return ServedFile{.file = std::move(file),
+                      .source = in_hand.generated ? ChunkSource::generated : ChunkSource::store};
+}
+
+/// `stack` is null for the centred tile, which is none.
+Result<void> ChunkBuilder::make_tile_mesh(const TileKey& key, const Stack* stack) {
+    const std::int32_t side = context_.world->definition.grid.side;
+    if (key.centred) {
+        const std::int32_t lod = key.position.lod;
+        const ColumnPos first = first_centred_column(lod, side);
+        const std::int64_t step = std::int64_t{1} << lod;
+        ColumnSet set;  // with the apron that a stack has
+        if (auto made = generator_.generate(set, {.x0 = first.x - step,
+                                                  .z0 = first.z - step,
+                                                  .width = side + 2,
+                                                  .length = side + 2,
+                                                  .lod = lod});
+            !made) {
+            return made;
+        }
+        raise(context_.counters->generations);
+        set.columns.x_first = -1;
+        set.columns.z_first = -1;
+        stack_ = {.position = key.position,
+                  .side = side,
+                  .columns = std::move(set.columns),
+                  .palette = std::move(set.palette),
+                  .highest_y256 = set.highest_y256};
+        stack = &stack_;
+    }
+    if (key.position.lod > 0) {
+        tile_mesher_.mesh(mesh_, *stack, true);
+    } else {
+        mesher_.mesh(mesh_, *stack, HeightRange{.first = 0, .last = tile_height_voxels_ - 1});
+        add_side_skirts(mesh_, side);
+    }
+    return {};
+}
+
+Result<Answer> ChunkBuilder::build_picture(const Task& task) {
+    const auto* map = std::get_if<MapTile>(&task.key);
+    const Drawing drawing{.world = context_.world, .generator = &generator_, .stop = task.stop};
+    auto image = map != nullptr ? draw_map_tile(drawing, *map)
+                                : draw_section(drawing, std::get<Section>(task.key));
+    if (!image) {
+        return tl::unexpected(image.error());
+    }
+    auto png = encode_png(*image);
+    if (!png) {
+        return tl::unexpected(png.error());
+    }
+    return ServedFile{.file = file_of(*std::move(png)), .source = ChunkSource::generated};
 }
 
 std::optional<Bytes> ChunkBuilder::read_record(const RecordKey& key) {

@@ -3,7 +3,7 @@
 //     mesh record in the store ── found ─────────────────────────────────────────────> answer
 //       └ stack: in memory | record in the store | generate, store.put ─> cut the chunk
 //           ├ columns: encode_chunk ─> payload (tag, zstd) ────────────────────────────> answer
-//           └ draco, blocky: a mesher ─> encode_draco ─> store.put ────────────────────> answer
+//           └ draco, blocky, glb: a mesher ─> encode_draco or encode_glb ─> store.put ─> answer
 //
 // A store only saves time: what it refuses to read or write is counted and served all the same, and
 // a record that can't be read back is made anew and overwritten.
@@ -61,6 +61,9 @@ class ChunkBuilder {
 
     Result<Answer> build_chunk(const Task& task, const ChunkKey& key);
     Result<Answer> build_column(const Task& task, ColumnPos column);
+    Result<Answer> build_tile(const Task& task, const TileKey& key);
+    Result<Answer> build_picture(const Task& task);
+    Result<void> make_tile_mesh(const TileKey& key, const Stack* stack);
     Result<StackInHand> stack_for(const Task& task, StackPos position);
     std::shared_ptr<const Stack> stored_stack(StackPos position);
     Result<EncodedChunk> encode_columns(const ChunkKey& key, const Stack& stack,
@@ -68,7 +71,7 @@ class ChunkBuilder {
     void make_mesh(const ChunkKey& key, const Stack& stack);
     Result<EncodedChunk> encode_mesh(const Task& task, const ChunkKey& key, const Stack& stack,
                                      AnswerTimings& timings);
-    std::shared_ptr<const EncodedChunk> stored_mesh(const ChunkKey& key);
+    std::shared_ptr<const EncodedChunk> stored_mesh(const RecordKey& key);
     std::optional<Bytes> read_record(const RecordKey& key);
     void write_record(const RecordKey& key, std::span<const std::byte> value);
     void store_failed(const Error& error);

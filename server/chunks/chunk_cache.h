@@ -12,8 +12,9 @@
 
 namespace terrane {
 
-/// Encoded chunks. Sixteen shards: with ten times fewer threads than that, two seldom meet.
-using ChunkCache = ShardedLru<ChunkKey, EncodedChunk, KeyHash, 16>;
+/// Encoded chunks and files. Sixteen shards: with ten times fewer threads than that, two seldom
+/// meet.
+using ChunkCache = ShardedLru<WorkKey, EncodedChunk, KeyHash, 16>;
 /// Stacks, so that the heights of one stack are cut from one generation. Few, large values: four
 /// shards.
 using StackCache = ShardedLru<StackPos, Stack, KeyHash, 4>;

@@ -1,5 +1,8 @@
 #include "server/chunks/chunk_service.h"
 
+#include "server/render/map_tile.h"
+#include "server/render/section.h"
+
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -158,10 +161,10 @@ Result<WorkKey> ChunkService::checked(const WorkKey& key) const {
                         "y " + std::to_string(chunk->position.y) +
                             ": above level 0 a chunk is the whole height, and its y is 0");
         }
-        if (chunk->format > ChunkFormat::draco_blocky) {
+        if (chunk->format > ChunkFormat::glb) {
             return fail(ErrorCode::unsupported,
                         "format " + std::to_string(static_cast<int>(chunk->format)) +
-                            ": this server has 0 (draco), 1 (columns) and 2 (blocky)");
+                            ": this server has 0 (draco), 1 (columns), 2 (blocky) and 3 (glb)");
         }
         if (lod > 0 && chunk->format == ChunkFormat::draco_blocky) {
             return fail(ErrorCode::unsupported,
@@ -169,6 +172,21 @@ Result<WorkKey> ChunkService::checked(const WorkKey& key) const {
                             " as blocky: only level 0 has blocks; ask for draco");
         }
         return WorkKey(chunk->normalised());
+    }
+    if (const auto* tile = std::get_if<TileKey>(&key)) {
+        const std::int32_t lod = tile->position.lod;
+        if (lod < 0 || lod >= levels_supported()) {
+            return fail(ErrorCode::unsupported, "level of detail " + std::to_string(lod) +
+                                                    ": this server has 0.." +
+                                                    std::to_string(levels_supported() - 1));
+        }
+        return key;
+    }
+    if (const auto* map = std::get_if<MapTile>(&key)) {
+        return check_map_tile(*map).map([&key] { return key; });
+    }
+    if (const auto* section = std::get_if<Section>(&key)) {
+        return check_section(*section).map([&key] { return key; });
     }
     const auto column = std::get<ColumnPos>(key);
     for (const std::int64_t at : {column.x, column.z}) {
@@ -229,13 +247,14 @@ Result<Answer> ChunkService::run_task(const BuildStep& step, const Task& task) {
         return answer;
     }
     raise(counters_.answers);
-    if (auto* chunk = std::get_if<ServedChunk>(&*answer)) {
-        chunk->timings.queue_us = queue_us;
-        // Before the waiters are taken: who misses the table from here on finds the cache.
-        try {
+    try {  // before the waiters are taken: who misses the table from here on finds the cache
+        if (auto* chunk = std::get_if<ServedChunk>(&*answer)) {
+            chunk->timings.queue_us = queue_us;
             cache_.put(chunk->key, chunk->chunk, memory_bytes(*chunk->chunk));
-        } catch (const std::exception&) {  // no memory: who asks next has it made again
+        } else if (const auto* file = std::get_if<ServedFile>(&*answer)) {
+            cache_.put(task.key, file->file, memory_bytes(*file->file));
         }
+    } catch (const std::exception&) {  // no memory: who asks next has it made again
     }
     return answer;
 }
@@ -262,15 +281,15 @@ Result<Answer> ChunkService::build(const BuildStep& step, const Task& task) {
 }
 
 std::optional<Answer> ChunkService::cached(const WorkKey& key) {
-    const auto* chunk = std::get_if<ChunkKey>(&key);
-    if (chunk == nullptr) {
-        return std::nullopt;
-    }
-    auto encoded = cache_.get(*chunk);
+    auto encoded = cache_.get(key);
     if (!encoded) {
         return std::nullopt;
     }
     raise(counters_.cache_hits);
+    const auto* chunk = std::get_if<ChunkKey>(&key);
+    if (chunk == nullptr) {
+        return ServedFile{.file = std::move(encoded), .source = ChunkSource::cache};
+    }
     return ServedChunk{
         .key = *chunk, .chunk = std::move(encoded), .source = ChunkSource::cache, .timings = {}};
 }

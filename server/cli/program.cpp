@@ -25,6 +25,7 @@ int run_program(int argc, char** argv) {
     add_verify_command(app, exit_code);
     add_world_command(app, exit_code);
     add_column_command(app, exit_code);
+    add_map_command(app, exit_code);
     add_slice_command(app, exit_code);
     add_picture_command(app, exit_code);
     add_report_command(app, exit_code);

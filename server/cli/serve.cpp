@@ -29,6 +29,7 @@ struct ServeArguments {
     std::string world;
     std::string data;
     std::string tcp = "127.0.0.1:7777";
+    std::string http = "127.0.0.1:8080";
     std::size_t workers =
         std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kWorkersMax);
     std::size_t cache_mib = 256;
@@ -116,6 +117,13 @@ int run_serve(const ServeArguments& arguments) {
                          " bytes when written out in full; at most " +
                          std::to_string(kWorldTextBytesMax) + " can be sent to clients");
     }
+    if (arguments.http != "none") {
+        const auto http = parse_endpoint(arguments.http);
+        if (!http) {
+            return wrong_use("--http: " + http.error().message + "; or none");
+        }
+        options.http = *http;
+    }
     options.data_directory = arguments.data;
     options.listen.endpoint = *endpoint;
     options.workers = arguments.workers;
@@ -140,6 +148,10 @@ int run_serve(const ServeArguments& arguments) {
                 to_string((*server)->endpoint()).c_str(), options.world->definition.name.c_str(),
                 to_hex(options.world->fingerprint).c_str(), options.workers,
                 arguments.store.c_str());
+    if (const auto http = (*server)->http_endpoint()) {
+        std::printf("listening on http %s: http://%s/\n", to_string(*http).c_str(),
+                    to_string(*http).c_str());
+    }
     std::fflush(stdout);
     const std::string signal = signals.wait();
     log.info("draining; a second signal ends at once",
@@ -162,6 +174,10 @@ void add_serve_command(CLI::App& app, int& exit_code) {
     serve->add_option("--world", arguments->world, "World file")->required();
     serve->add_option("--data", arguments->data, "Folder where chunks are kept; made if missing");
     serve->add_option("--tcp", arguments->tcp, "Address and port; port 0 takes a free one")
+        ->capture_default_str();
+    serve
+        ->add_option("--http", arguments->http,
+                     "Address and port of HTTP and WebSocket; none turns them off")
         ->capture_default_str();
     serve->add_option("--workers", arguments->workers, "Threads that make chunks")
         ->check(CLI::Range(std::size_t{1}, kWorkersMax))

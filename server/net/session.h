@@ -1,5 +1,5 @@
 // One client's session, from its hello to its goodbye, without a socket: bytes in, an outbox out,
-// the time given. A transport (tcp_listener.cpp) feeds it, writes the outbox and closes when told.
+// the time given. A transport (listener.cpp) feeds it, writes the outbox and closes when told.
 //
 //     hello ──ClientHello──> open ──drain──> finishing ──last answer──> closing ──> dead
 //       └──── malformed, too late, wrong version ─────────────────────────┘

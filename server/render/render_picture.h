@@ -3,7 +3,7 @@
 
 #include "generator/terrain/world.h"
 #include "protocol/base/result.h"
-#include "server/cli/png.h"
+#include "server/render/png.h"
 #include "server/render/scene.h"
 
 #include <glm/glm.hpp>

@@ -1,7 +1,7 @@
 #include "server/report/figures.h"
 
-#include "server/cli/slice.h"
 #include "server/render/render_picture.h"
+#include "server/render/section.h"
 #include "server/report/shipped_world.h"
 
 #include <array>
@@ -101,9 +101,11 @@ Result<void> write_figures(Page& page, const ReportOptions& options) {
         if (!world) {
             return tl::unexpected(world.error());
         }
-        const auto png = draw_slice(*world, {.from = {.x = figure.from_x, .z = figure.z},
-                                             .to = {.x = figure.to_x, .z = figure.z},
-                                             .scale = figure.scale})
+        StackGenerator generator(*world);
+        const auto png = draw_section({.world = &*world, .generator = &generator},
+                                      {.from = {.x = figure.from_x, .z = figure.z},
+                                       .to = {.x = figure.to_x, .z = figure.z},
+                                       .scale = figure.scale})
                              .and_then([](const Image& image) { return encode_png(image); });
         if (!png) {
             return tl::unexpected(png.error());

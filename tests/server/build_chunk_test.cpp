@@ -2,6 +2,7 @@
 #include "server/chunks/build_chunk.h"
 
 #include "generator/mesh/draco_codec.h"
+#include "generator/mesh/glb.h"
 #include "generator/volume/chunk_codec.h"
 #include "protocol/wire/column_payload.h"
 #include "storage/memory_store.h"
@@ -170,6 +171,101 @@ TEST(BuildChunk, BlocksAreWhatTheBlockyMesherMakesAndARecordOfTheirOwn) {
         EXPECT_EQ(again.source, ChunkSource::store);
         EXPECT_EQ(again.chunk->etag, etags[static_cast<std::size_t>(y + 1)]);
     }
+}
+
+std::string_view glb_json(const Bytes& glb) {
+    const std::string_view text = text_of(glb);
+    return text.substr(20, text.find("BIN") - 24);
+}
+
+TEST(BuildChunk, AGlbHasTheTrianglesOfTheDracoMeshAtTheChunksPlace) {
+    Pipeline p;
+    StackGenerator generator(*p.world);
+    SurfaceNetsMesher mesher(p.world->definition);
+    Stack stack;
+    ASSERT_TRUE(generator.generate(stack, {.lod = 0, .x = 3, .z = -2}));
+    int full = 0;
+    for (std::int32_t y = -1; y <= highest_chunk(*p.world); ++y) {
+        const ServedChunk draco = p.chunk(key_of(y, ChunkFormat::draco));
+        const ServedChunk glb = p.chunk(key_of(y, ChunkFormat::glb));
+        ASSERT_EQ(glb.chunk->status, draco.chunk->status) << y;
+        EXPECT_EQ(glb.chunk->uniform, draco.chunk->uniform);
+        if (glb.chunk->status != ChunkStatus::full) {
+            continue;
+        }
+        ++full;
+        const Grid& grid = p.world->definition.grid;
+        const auto place = glb_place_of({.x = 3 * grid.side, .z = -2 * grid.side},
+                                        std::int64_t{y} * grid.height, 0, grid.voxel_size_m);
+        Mesh mesh;
+        mesher.mesh(mesh, stack, y, grid.height);
+        EXPECT_EQ(*glb.chunk->payload,
+                  encode_glb(mesh, {.side = grid.side, .height_voxels = grid.height + 1}, place));
+        EXPECT_NE(glb_json(*glb.chunk->payload).find("KHR_draco_mesh_compression"),
+                  std::string_view::npos);
+    }
+    EXPECT_GT(full, 0);
+    p.restart();
+    EXPECT_EQ(p.chunk(key_of(0, ChunkFormat::glb)).source, ChunkSource::store);
+}
+
+ServedFile file(Pipeline& p, const WorkKey& key) {
+    const auto answer = p.build(key);
+    EXPECT_TRUE(answer) << answer.error().message;
+    return std::get<ServedFile>(*answer);
+}
+
+TEST(BuildChunk, TilesAreFilesOfTheirOwnAndSurviveARestart) {
+    Pipeline p;
+    const std::vector<TileKey> keys = {{.position = {.lod = 0, .x = 3, .z = -2}},
+                                       {.position = {.lod = 1, .x = 3, .z = -2}},
+                                       {.position = {.lod = 17, .x = 0, .z = 0}},
+                                       {.position = {.lod = 17, .x = 0, .z = 0}, .centred = true}};
+    std::vector<Hash128> etags;
+    for (const TileKey& key : keys) {
+        const ServedFile made = file(p, key);
+        EXPECT_EQ(made.source, ChunkSource::generated);
+        EXPECT_EQ(made.file->status, ChunkStatus::full);
+        etags.push_back(made.file->etag);
+    }
+    EXPECT_EQ(p.generations(), 4U);
+    EXPECT_NE(etags[2], etags[3]);
+    // Above level 0 a chunk is the whole stack: one record for both.
+    const ServedChunk chunk =
+        p.chunk({.position = {.lod = 1, .x = 3, .y = 0, .z = -2}, .format = ChunkFormat::glb});
+    EXPECT_EQ(chunk.source, ChunkSource::store);
+    EXPECT_EQ(chunk.chunk->etag, etags[1]);
+    p.restart();
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const ServedFile again = file(p, keys[i]);
+        EXPECT_EQ(again.source, ChunkSource::store);
+        EXPECT_EQ(again.file->etag, etags[i]);
+    }
+    EXPECT_EQ(p.generations(), 4U);
+}
+
+TEST(BuildChunk, TheCentredTileLiesAroundTheOrigin) {
+    Pipeline p;
+    const ServedFile made =
+        file(p, TileKey{.position = {.lod = 5, .x = 0, .z = 0}, .centred = true});
+    const std::string_view json = glb_json(*made.file->payload);
+    EXPECT_NE(json.find("\"translation\":[0,"), std::string_view::npos) << json;
+}
+
+TEST(BuildChunk, PicturesArePngFiles) {
+    Pipeline p;
+    for (const WorkKey& key :
+         {WorkKey(MapTile{.zoom = 18, .x = 1 << 17, .y = 1 << 17}),
+          WorkKey(Section{.from = {.x = -20, .z = 5}, .to = {.x = 20, .z = 9}, .scale = 2})}) {
+        const ServedFile made = file(p, key);
+        EXPECT_EQ(text_of(*made.file->payload).substr(0, 4), "\x89PNG");
+        EXPECT_EQ(file(p, key).file->etag, made.file->etag);
+    }
+    std::stop_source source;
+    source.request_stop();
+    const auto stopped = p.build(MapTile{}, source.get_token());
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
 }
 
 TEST(BuildChunk, AMeshIsWhatTheMesherMakes) {

@@ -333,7 +333,7 @@ TEST(ChunkService, RefusesWhatItCanNotMake) {
     const auto high = f.request(ChunkKey{.position = {.lod = 1, .x = 0, .y = 1, .z = 0}});
     ASSERT_FALSE(high);
     EXPECT_EQ(high.error().code, ErrorCode::out_of_range);
-    const auto unknown = f.request(ChunkKey{.position = {}, .format = static_cast<ChunkFormat>(3)});
+    const auto unknown = f.request(ChunkKey{.position = {}, .format = static_cast<ChunkFormat>(4)});
     ASSERT_FALSE(unknown);
     EXPECT_EQ(unknown.error().code, ErrorCode::unsupported);
     const auto far_blocks = f.request(ChunkKey{.position = {.lod = 1, .x = 0, .y = 0, .z = 0},

@@ -58,7 +58,7 @@ class ServeProcess {
             ::dup2(pipe[1], STDOUT_FILENO);
             ::close(pipe[0]);
             ::close(pipe[1]);
-            arguments.insert(arguments.end(), {"--tcp", "127.0.0.1:0"});
+            arguments.insert(arguments.end(), {"--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"});
             ::_exit(run(std::move(arguments)));
         }
         ::close(pipe[1]);
@@ -163,7 +163,7 @@ TEST(Serve, ASecondSignalEndsAtOnce) {
 TEST(Serve, SaysWhereItListensAndWhichWorldItIs) {
     const ServeProcess serve({"--world", world_path(), "--store", "memory", "--log-level", "off"});
     EXPECT_NE(serve.line().find("world \"paper-B2\", fingerprint "), std::string::npos);
-    EXPECT_EQ(std::count(serve.line().begin(), serve.line().end(), '\n'), 1);
+    EXPECT_EQ(std::count(serve.line().begin(), serve.line().end(), '\n'), 2);
 }
 
 TEST(Serve, APortInUseOrAFolderItCanNotHaveIsAFailure) {

@@ -1,8 +1,9 @@
-#include "server/cli/slice.h"
+#include "server/render/section.h"
 
 #include "generator/terrain/generate_stack.h"
 #include "protocol/base/write_file.h"
 #include "server/cli/program.h"
+#include "server/render/section_columns.h"
 #include "tests/support/test_world.h"
 
 #include <gtest/gtest.h>
@@ -40,19 +41,24 @@ std::size_t files_in(const std::filesystem::path& folder) {
     return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
 }
 
-TEST(Slice, TheLineKeepsBothEndsAndStepsOneColumnAtATime) {
-    const auto columns = columns_on({.from = {.x = 3, .z = -1}, .to = {.x = -4, .z = 2}});
+Result<Image> draw(const World& world, const Section& section) {
+    StackGenerator generator(world);
+    return draw_section({.world = &world, .generator = &generator}, section);
+}
+
+TEST(Section, TheLineKeepsBothEndsAndStepsOneColumnAtATime) {
+    const auto columns = columns_on({.x = 3, .z = -1}, {.x = -4, .z = 2});
     ASSERT_EQ(columns.size(), 8U);
     EXPECT_EQ(columns.front(), (ColumnPos{.x = 3, .z = -1}));
     EXPECT_EQ(columns[4], (ColumnPos{.x = -1, .z = 1}));
     EXPECT_EQ(columns.back(), (ColumnPos{.x = -4, .z = 2}));
-    EXPECT_EQ(columns_on({.from = {.x = 5, .z = 6}, .to = {.x = 5, .z = 6}}).size(), 1U);
+    EXPECT_EQ(columns_on({.x = 5, .z = 6}, {.x = 5, .z = 6}).size(), 1U);
 }
 
-TEST(Slice, ThePictureIsSkyOnTopAndBaseAtTheBottom) {
+TEST(Section, ThePictureIsSkyOnTopAndBaseAtTheBottom) {
     const auto world = load_test_world("paper-B3-seed42");
     const auto image =
-        draw_slice(*world, {.from = {.x = -20, .z = -20}, .to = {.x = 20, .z = 9}, .scale = 3});
+        draw(*world, {.from = {.x = -20, .z = -20}, .to = {.x = 20, .z = 9}, .scale = 3});
     ASSERT_TRUE(image) << image.error().message;
     EXPECT_EQ(image->width, 41 * 3);
     EXPECT_EQ(image->height % 3, 0);
@@ -69,40 +75,92 @@ TEST(Slice, ThePictureIsSkyOnTopAndBaseAtTheBottom) {
     }
 }
 
-TEST(Slice, EveryColumnOfALineStandsAtItsOwnPlace) {
+TEST(Section, EveryColumnOfALineStandsAtItsOwnPlace) {
     // A diagonal line is generated in boxes; each column must be the one that stands there.
     const auto world = load_test_world("dense-seed43");
-    const SliceLine line = {.from = {.x = -90, .z = 71}, .to = {.x = 60, .z = -70}, .scale = 1};
-    Image whole = draw_slice(*world, line).value();
-    const auto columns = columns_on(line);
+    const Section line = {.from = {.x = -90, .z = 71}, .to = {.x = 60, .z = -70}, .scale = 1};
+    Image whole = draw(*world, line).value();
+    const auto columns = columns_on(line.from, line.to);
     for (std::size_t i = 0; i < columns.size(); i += 13) {
-        Image one = draw_slice(*world, {.from = columns[i], .to = columns[i], .scale = 1}).value();
-        // The terrain's part; the sky depends on the picture's height.
-        for (std::int32_t up = 0; up < one.height; ++up) {
-            const Rgb8 alone = one.at(0, one.height - 1 - up);
-            if (alone.b > alone.r && alone.b > 170) {
+        Image one = draw(*world, {.from = columns[i], .to = columns[i], .scale = 1}).value();
+        // The terrain's part; the sky, and the pixel where both meet, depend on the picture's
+        // height.
+        for (std::int32_t up = 0; up + 1 < one.height; ++up) {
+            const Rgb8 above = one.at(0, one.height - 2 - up);
+            if (above.b > above.r && above.b > 170) {
                 break;
             }
+            const Rgb8 alone = one.at(0, one.height - 1 - up);
             EXPECT_EQ(whole.at(static_cast<std::int32_t>(i), whole.height - 1 - up), alone)
                 << i << ' ' << up;
         }
     }
 }
 
-TEST(Slice, TooLongALineOrTooLargeAPictureIsRefused) {
-    const auto world = load_test_world("paper-B3-seed42");
-    const SliceLine endless = {.from = {.x = -(std::int64_t{1} << 52), .z = 0},
-                               .to = {.x = std::int64_t{1} << 52, .z = 0}};
-    EXPECT_EQ(draw_slice(*world, endless).error().code, ErrorCode::too_large);
-    EXPECT_EQ(
-        draw_slice(*world, {.from = {}, .to = {.x = 20000, .z = 0}, .scale = 64}).error().code,
-        ErrorCode::too_large);
-    const SliceLine edge = {.from = {.x = kColumnCoordinateLimit - 1, .z = 0},
-                            .to = {.x = kColumnCoordinateLimit - 3, .z = 0}};
-    EXPECT_EQ(draw_slice(*world, edge).error().code, ErrorCode::out_of_range);
+TEST(Section, FrontiersRunSmoothlyFromColumnToColumn) {
+    // A step of 4 voxels from one column to the next, and a vein that only the left one has.
+    const LinearColor low{.r = 1, .g = 0, .b = 0};
+    const LinearColor vein{.r = 0, .g = 1, .b = 0};
+    const auto limit = [](float y, PaletteKind kind, std::size_t sort, LinearColor color) {
+        return SeenLimit{.y = y, .kind = kind, .sort = sort, .color = color};
+    };
+    const SeenColumn left = {
+        limit(0, PaletteKind::layer, 0, low), limit(10, PaletteKind::layer, 0, low),
+        limit(10, PaletteKind::vein, 900, vein), limit(16, PaletteKind::vein, 900, vein),
+        limit(16, PaletteKind::void_, 2, {})};
+    const SeenColumn right = {limit(0, PaletteKind::layer, 0, low),
+                              limit(14, PaletteKind::layer, 0, low),
+                              limit(14, PaletteKind::void_, 2, {})};
+    std::vector<PairedLimit> paired;
+    std::vector<std::uint16_t> scratch;
+    pair_limits(paired, left, right, scratch);
+    ASSERT_EQ(paired.size(), 5U);
+    EXPECT_EQ(paired[1].y_right, 14);
+    EXPECT_EQ(paired[2].y_right, 14);  // the vein closes where the right column's top is
+    EXPECT_EQ(paired[3].y_right, 14);
+    EXPECT_FALSE(paired[3].in_right);
+    EXPECT_EQ(paired[4].kind, PaletteKind::void_);
+    pair_limits(paired, right, left, scratch);
+    for (std::size_t i = 1; i < paired.size(); ++i) {
+        EXPECT_GE(paired[i].y_left, paired[i - 1].y_left);
+        EXPECT_GE(paired[i].y_right, paired[i - 1].y_right);
+    }
 }
 
-TEST(Slice, PngFilesHoldThePixels) {
+TEST(Section, AStoppedDrawingIsCancelled) {
+    const auto world = load_test_world("paper-B3-seed42");
+    StackGenerator generator(*world);
+    std::stop_source source;
+    source.request_stop();
+    const auto image =
+        draw_section({.world = world.get(), .generator = &generator, .stop = source.get_token()},
+                     {.from = {}, .to = {.x = 50, .z = 0}});
+    ASSERT_FALSE(image);
+    EXPECT_EQ(image.error().code, ErrorCode::cancelled);
+}
+
+TEST(Section, AHeightCutsThePicture) {
+    const auto world = load_test_world("paper-B3-seed42");
+    const auto image =
+        draw(*world, {.from = {}, .to = {.x = 9, .z = 0}, .height_voxels = 40, .scale = 2});
+    ASSERT_TRUE(image);
+    EXPECT_EQ(image->width, 20);
+    EXPECT_EQ(image->height, 80);
+}
+
+TEST(Section, TooLongALineOrTooLargeAPictureIsRefused) {
+    const auto world = load_test_world("paper-B3-seed42");
+    const Section endless = {.from = {.x = -(std::int64_t{1} << 52), .z = 0},
+                             .to = {.x = std::int64_t{1} << 52, .z = 0}};
+    EXPECT_EQ(draw(*world, endless).error().code, ErrorCode::too_large);
+    EXPECT_EQ(draw(*world, {.from = {}, .to = {.x = 20000, .z = 0}, .scale = 64}).error().code,
+              ErrorCode::too_large);
+    const Section edge = {.from = {.x = kColumnCoordinateLimit - 1, .z = 0},
+                          .to = {.x = kColumnCoordinateLimit - 3, .z = 0}};
+    EXPECT_EQ(draw(*world, edge).error().code, ErrorCode::out_of_range);
+}
+
+TEST(Section, PngFilesHoldThePixels) {
     Image image = make_image(3, 2).value();
     image.at(2, 1) = {.r = 1, .g = 2, .b = 250};
     const Bytes bytes = encode_png(image).value();
@@ -118,7 +176,7 @@ TEST(Slice, PngFilesHoldThePixels) {
               (std::vector<std::uint8_t>{1, 2, 250}));
 }
 
-TEST(Slice, TheProgramWritesAPngWholeOrNotAtAll) {
+TEST(Section, TheProgramWritesAPngWholeOrNotAtAll) {
     const auto folder = fresh_folder();
     const std::string world = test_data_path("paper-B3-seed42.toml").string();
     const std::string out = (folder / "cut.png").string();
@@ -135,7 +193,7 @@ TEST(Slice, TheProgramWritesAPngWholeOrNotAtAll) {
     EXPECT_EQ(files_in(folder), 1U);
 }
 
-TEST(Slice, WrongUseIsExitCodeTwo) {
+TEST(Section, WrongUseIsExitCodeTwo) {
     const std::string world = test_data_path("paper-B3-seed42.toml").string();
     const std::string out = (fresh_folder() / "cut.png").string();
     const auto code = [&](const std::string& from, const std::string& to,

@@ -1,4 +1,4 @@
-#include "server/cli/png.h"
+#include "server/render/png.h"
 
 #include "protocol/base/check.h"
 

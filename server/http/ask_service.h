@@ -1,0 +1,19 @@
+// A route's question to the chunk service, and what becomes of it when the client leaves.
+#pragma once
+
+#include "server/chunks/chunk_service.h"
+#include "server/http/http_message.h"
+
+#include <functional>
+
+namespace terrane {
+
+/// Told the answer once, on the caller's thread if it was in the cache, else on a worker's: hands
+/// it on. If the client goes first, the question is taken back and `then` may never be called.
+using ThenAnswer = std::function<void(const Result<Answer>&)>;
+
+/// Asks for one chunk or column on behalf of `request`. `service` outlives all answers.
+void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& request,
+                 ThenAnswer then);
+
+}  // namespace terrane

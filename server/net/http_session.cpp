@@ -1,0 +1,386 @@
+#include "server/net/http_session.h"
+
+#include "server/http/problem.h"
+
+#include <algorithm>
+#include <charconv>
+#include <ctime>
+#include <thread>
+#include <utility>
+
+namespace terrane {
+
+namespace {
+
+constexpr std::size_t kHeadBytes = 512;  ///< of an ordinary answer, with room to spare
+/// Pipelined requests that wait while one is answered.
+constexpr std::size_t kWaitingBytesMax = kHttpHeaderBytesMax;
+
+/// What every answer says.
+constexpr std::string_view kCommonHeaders =
+    "Server: terrane\r\n"
+    "Access-Control-Allow-Origin: *\r\n"
+    "Access-Control-Expose-Headers: ETag, Location, Retry-After, Terrane-Request, "
+    "Terrane-Status\r\n";
+/// What the answer to OPTIONS says besides.
+constexpr std::string_view kPreflightHeaders =
+    "Access-Control-Allow-Methods: GET, HEAD, OPTIONS\r\n"
+    "Access-Control-Allow-Headers: Authorization, If-None-Match\r\n"
+    "Access-Control-Max-Age: 86400\r\n";
+
+std::string_view cache_header(HttpCaching caching) {
+    switch (caching) {
+        case HttpCaching::immutable:
+            return "Cache-Control: public, max-age=31536000, immutable\r\n";
+        case HttpCaching::revalidate:
+            return "Cache-Control: no-cache\r\n";
+        case HttpCaching::none:
+            return "Cache-Control: no-store\r\n";
+    }
+    return {};
+}
+
+/// Appends text to bytes that have room.
+class HeadWriter {
+  public:
+    explicit HeadWriter(Bytes& out) : out_(out) {}
+
+    HeadWriter& operator<<(std::string_view text) {
+        const auto bytes = bytes_of(text);
+        out_.insert(out_.end(), bytes.begin(), bytes.end());
+        return *this;
+    }
+
+    HeadWriter& operator<<(std::uint64_t number) {
+        std::array<char, 20> digits{};
+        const auto [end, error] =
+            std::to_chars(digits.data(), digits.data() + digits.size(), number);
+        if (error == std::errc()) {
+            *this << std::string_view(digits.data(), end);
+        }
+        return *this;
+    }
+
+    /// A header's value may have no line end in it.
+    void value(std::string_view text) {
+        for (const char c : text) {
+            const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+            out_.push_back(static_cast<std::byte>(is_control ? '?' : c));
+        }
+    }
+
+  private:
+    Bytes& out_;
+};
+
+}  // namespace
+
+std::string_view http_date(std::chrono::system_clock::time_point now) {
+    thread_local std::time_t made_for = 0;
+    thread_local std::array<char, 40> text{};
+    thread_local std::size_t size = 0;
+    const std::time_t seconds = std::chrono::system_clock::to_time_t(now);
+    if (size == 0 || seconds != made_for) {
+        std::tm parts{};
+        gmtime_r(&seconds, &parts);
+        size = std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts);
+        made_for = seconds;
+    }
+    return {text.data(), size};
+}
+
+Bytes http_head(const HttpResponse& response, std::uint64_t request_id, bool keep_alive,
+                std::string_view date) {
+    Bytes head;
+    head.reserve(kHeadBytes);
+    HeadWriter out(head);
+    out << "HTTP/1.1 " << std::uint64_t{response.status} << " " << reason_phrase(response.status)
+        << "\r\nDate: " << date << "\r\n"
+        << kCommonHeaders << cache_header(response.caching) << "Terrane-Request: " << request_id
+        << "\r\n";
+    if (!response.etag.empty()) {
+        out << "ETag: \"" << response.etag << "\"\r\n";
+    }
+    if (!response.content_type.empty()) {
+        out << "Content-Type: " << response.content_type << "\r\n";
+    }
+    for (const auto& [name, value] : response.headers) {
+        out << name << ": ";
+        out.value(value);
+        out << "\r\n";
+    }
+    if (response.status == 204) {
+        out << kPreflightHeaders;
+    } else if (response.status != 304 && response.status != 101) {
+        out << "Content-Length: " << std::uint64_t{response.body ? response.body->size() : 0}
+            << "\r\n";
+    }
+    if (!keep_alive) {
+        out << "Connection: close\r\n";
+    }
+    out << "\r\n";
+    return head;
+}
+
+/// The request that is being answered. The answer may come from any thread.
+struct HttpSession::Pending {
+    std::weak_ptr<HttpSession> session;
+    ConnectionPost post;
+    std::thread::id thread;  ///< the session's
+    std::uint64_t id = 0;
+    std::string method;
+    std::string path;
+    bool keep_alive = true;
+    bool is_http_1_0 = false;
+    Clock::time_point since;
+    // The session's thread only:
+    bool in_handler = true;
+    std::optional<HttpResponse> at_once;
+
+    static void deliver(const std::shared_ptr<Pending>& self, HttpResponse response) {
+        if (std::this_thread::get_id() == self->thread && self->in_handler) {
+            self->at_once = std::move(response);
+            return;
+        }
+        self->post([self, response = std::move(response)]() mutable {
+            const auto session = self->session.lock();
+            if (session && session->pending_ == self) {
+                session->answer(*self, std::move(response));
+                session->process(Clock::now());
+            }
+        });
+    }
+};
+
+HttpSession::HttpSession(const HttpContext& context, ConnectionOrigin origin, ConnectionPost post,
+                         Clock::time_point now)
+    : context_(context),
+      origin_(std::move(origin)),
+      post_(std::move(post)),
+      idle_since_(now),
+      request_since_(now) {}
+
+void HttpSession::receive(std::span<const std::byte> bytes, Clock::time_point now) {
+    if (!reader_.is_inside_request()) {
+        request_since_ = now;
+    }
+    reader_.feed(bytes);
+    process(now);
+}
+
+void HttpSession::process(Clock::time_point now) {
+    while (!pending_ && !upgrade_ && !closing_ && !dead_ && !outbox_.full()) {
+        if (draining_ && !reader_.is_inside_request()) {
+            close_with("the server is shutting down");
+            return;
+        }
+        auto next = reader_.next();
+        if (!next) {
+            refuse(next.error());
+            return;
+        }
+        if (!*next) {
+            if (input_ended_) {
+                close_with({});
+            }
+            return;
+        }
+        had_request_ = true;
+        request_since_ = now;
+        dispatch(**std::move(next), now);
+    }
+}
+
+void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
+    context_.counters->requests.fetch_add(1, std::memory_order_relaxed);
+    received.request.id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
+    received.request.stop = stop_.get_token();
+    pending_ = std::make_shared<Pending>();
+    pending_->session = weak_from_this();
+    pending_->post = post_;
+    pending_->thread = std::this_thread::get_id();
+    pending_->id = received.request.id;
+    pending_->method = received.request.method;
+    pending_->keep_alive = received.keep_alive && !draining_;
+    pending_->is_http_1_0 = received.is_http_1_0;
+    pending_->since = now;
+    if (context_.requests_log != nullptr) {
+        pending_->path = received.request.path;
+    }
+    const auto pending = pending_;
+    if (received.request.path == context_.websocket.path && context_.websocket.make) {
+        if (upgrades(received)) {
+            pending_.reset();
+            upgrade_ = std::move(received);
+            return;
+        }
+        HttpResponse refusal =
+            http_problem(426, "here the native messages are spoken over WebSocket, version 13");
+        refusal.headers = {{"Upgrade", "websocket"}, {"Sec-WebSocket-Version", "13"}};
+        answer(*pending, std::move(refusal));
+        return;
+    }
+    context_.router->handle(received.request, [pending](HttpResponse response) {
+        Pending::deliver(pending, std::move(response));
+    });
+    pending->in_handler = false;
+    if (pending->at_once) {
+        answer(*pending, *std::exchange(pending->at_once, std::nullopt));
+    }
+}
+
+bool HttpSession::upgrades(const ReceivedRequest& received) {
+    return received.request.method == "GET" && received.wants_websocket &&
+           !received.websocket_key.empty() && received.websocket_version == "13" && !draining_;
+}
+
+void HttpSession::answer(const Pending& pending, HttpResponse response) {
+    HttpCounters& counters = *context_.counters;
+    counters.by_class.at(std::min(response.status / 100, 5U))
+        .fetch_add(1, std::memory_order_relaxed);
+    if (response.status == 304) {
+        counters.not_modified.fetch_add(1, std::memory_order_relaxed);
+    }
+    const bool keep_alive = pending.keep_alive && !input_ended_;
+    if (pending.is_http_1_0 && keep_alive) {
+        response.headers.emplace_back("Connection", "keep-alive");
+    }
+    const bool has_body = pending.method != "HEAD" && response.status != 304;
+    outbox_.push(
+        http_head(response, pending.id, keep_alive, http_date(std::chrono::system_clock::now())),
+        has_body ? response.body : nullptr);
+    if (context_.requests_log != nullptr) {
+        const auto took =
+            std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
+        context_.requests_log->debug(
+            "http", {{"request", pending.id},
+                     {"session", origin_.id},
+                     {"method", pending.method},
+                     {"path", pending.path},
+                     {"status", std::uint64_t{response.status}},
+                     {"bytes", std::uint64_t{response.body ? response.body->size() : 0}},
+                     {"us", std::int64_t{took.count()}}});
+    }
+    pending_.reset();
+    if (!keep_alive) {
+        close_with({});
+    }
+}
+
+void HttpSession::refuse(const HttpFault& fault) {
+    context_.counters->by_class.at(fault.status / 100).fetch_add(1, std::memory_order_relaxed);
+    HttpResponse response = http_problem(fault.status, fault.detail);
+    const auto id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
+    outbox_.push(http_head(response, id, false, http_date(std::chrono::system_clock::now())),
+                 response.body);
+    close_with(std::string(to_string(ErrorCode::malformed)) + ": " + fault.detail);
+}
+
+void HttpSession::close_with(std::string reason) {
+    closing_ = true;
+    close_reason_ = std::move(reason);
+}
+
+void HttpSession::input_ended() {
+    input_ended_ = true;
+    if (pending_) {  // who has stopped sending has left
+        stop_.request_stop();
+        dead_ = true;
+        return;
+    }
+    if (!closing_) {
+        close_with({});
+    }
+}
+
+std::size_t HttpSession::gather(Outbox::Gather& out) {
+    return outbox_.gather(out);
+}
+
+void HttpSession::written(std::size_t size_bytes, Clock::time_point now) {
+    outbox_.consume(size_bytes);
+    write_waits_since_.reset();
+    if (outbox_.empty()) {
+        idle_since_ = now;
+    }
+    process(now);
+}
+
+void HttpSession::tick(Clock::time_point now) {
+    if (outbox_.empty()) {
+        write_waits_since_.reset();
+    } else if (!write_waits_since_) {
+        write_waits_since_ = now;
+    } else if (now - *write_waits_since_ > context_.timeouts.stall) {
+        close_reason_ = "the client does not read";
+        dead_ = true;
+        return;
+    }
+    if (closing_ || pending_ || !outbox_.empty()) {
+        return;
+    }
+    const HttpTimeouts& limits = context_.timeouts;
+    if (reader_.is_inside_body()) {
+        if (now - request_since_ > limits.stall) {
+            refuse({.status = 408, .detail = "the body did not come in time"});
+        }
+    } else if (reader_.is_inside_request()) {
+        if (now - request_since_ > limits.header) {
+            refuse({.status = 408, .detail = "the headers did not come in time"});
+        }
+    } else if (now - idle_since_ > (had_request_ ? limits.keep_alive : limits.header)) {
+        close_with({});
+    }
+}
+
+void HttpSession::drain() {
+    draining_ = true;
+    if (pending_) {
+        pending_->keep_alive = false;
+    }
+    process(Clock::now());
+}
+
+void HttpSession::end() {
+    stop_.request_stop();
+    pending_.reset();
+    dead_ = true;
+}
+
+bool HttpSession::wants_input() const {
+    return !closing_ && !dead_ && !upgrade_ && !input_ended_ && !outbox_.full() &&
+           (!pending_ || reader_.buffered_bytes() < kWaitingBytesMax);
+}
+
+bool HttpSession::is_closing() const {
+    return closing_;
+}
+
+bool HttpSession::is_dead() const {
+    return dead_;
+}
+
+std::string HttpSession::client_name() const {
+    return {};
+}
+
+std::string HttpSession::close_reason() const {
+    return close_reason_;
+}
+
+std::shared_ptr<ByteProtocol> HttpSession::take_successor() {
+    if (!upgrade_ || !outbox_.empty()) {
+        return nullptr;
+    }
+    const ReceivedRequest request = *std::exchange(upgrade_, std::nullopt);
+    return context_.websocket.make(request, reader_.take_rest(), post_, Clock::now());
+}
+
+ProtocolFactory http_protocol(const HttpContext& context) {
+    return [&context](const ConnectionOrigin& origin, ConnectionPost post,
+                      ByteProtocol::Clock::time_point now) {
+        return std::make_shared<HttpSession>(context, origin, std::move(post), now);
+    };
+}
+
+}  // namespace terrane

@@ -1,0 +1,120 @@
+// One HTTP/1.1 connection without a socket: requests in, answers out, one at a time.
+//
+//     idle ──first byte──> reading ──whole──> answering ──answer──> idle, or closing
+//
+// The router makes the answers. One that it gives at once is written in the same step, by gather
+// write: the head is made here, the body is shared with the cache. One that comes later is posted
+// to the session's thread. Pipelined requests wait in the reader.
+#pragma once
+
+#include "server/http/router.h"
+#include "server/log.h"
+#include "server/net/byte_protocol.h"
+#include "server/net/http_reader.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+namespace terrane {
+
+struct HttpTimeouts {
+    std::chrono::milliseconds header{10'000};  ///< from a request's first byte to its last header
+    std::chrono::milliseconds stall{30'000};   ///< a body not ended; a write that stands
+    std::chrono::milliseconds keep_alive{60'000};  ///< between two requests
+};
+
+/// Only ever rise; any thread.
+struct HttpCounters {
+    std::atomic<std::uint64_t> requests{0};
+    std::array<std::atomic<std::uint64_t>, 6> by_class{};  ///< answers; [4]: status 400 to 499
+    std::atomic<std::uint64_t> not_modified{0};
+};
+
+/// Makes the protocol that follows an upgrade to WebSocket at `path`. `request` is the one that
+/// asked for it; `rest` are bytes that came behind it.
+struct WebSocketUpgrade {
+    std::string path;
+    std::function<std::shared_ptr<ByteProtocol>(const ReceivedRequest& request, Bytes rest,
+                                                ConnectionPost post,
+                                                ByteProtocol::Clock::time_point now)>
+        make;
+};
+
+/// What all HTTP sessions share; outlives them, and is used from any thread.
+struct HttpContext {
+    const Router* router = nullptr;
+    HttpCounters* counters = nullptr;
+    std::atomic<std::uint64_t>* next_request_id = nullptr;
+    HttpTimeouts timeouts;
+    WebSocketUpgrade websocket;
+    const Log* requests_log = nullptr;  ///< gets a line a request, if not null
+};
+
+/// The head of an answer, up to and with the empty line: status, headers that all answers have, and
+/// those that this one has. `date` is an IMF-fixdate.
+Bytes http_head(const HttpResponse& response, std::uint64_t request_id, bool keep_alive,
+                std::string_view date);
+
+/// "Sun, 06 Nov 1994 08:49:37 GMT", for now; made once a second.
+std::string_view http_date(std::chrono::system_clock::time_point now);
+
+class HttpSession final : public ByteProtocol, public std::enable_shared_from_this<HttpSession> {
+  public:
+    /// `context` outlives the session. Made by `std::make_shared`.
+    HttpSession(const HttpContext& context, ConnectionOrigin origin, ConnectionPost post,
+                Clock::time_point now);
+
+    void receive(std::span<const std::byte> bytes, Clock::time_point now) override;
+    void input_ended() override;
+    std::size_t gather(Outbox::Gather& out) override;
+    void written(std::size_t size_bytes, Clock::time_point now) override;
+    void tick(Clock::time_point now) override;
+    void drain() override;
+    void end() override;
+    bool wants_input() const override;
+    bool is_closing() const override;
+    bool is_dead() const override;
+    std::string client_name() const override;
+    std::string close_reason() const override;
+    std::shared_ptr<ByteProtocol> take_successor() override;
+
+  private:
+    struct Pending;
+
+    void process(Clock::time_point now);
+    void dispatch(ReceivedRequest received, Clock::time_point now);
+    void answer(const Pending& pending, HttpResponse response);
+    void refuse(const HttpFault& fault);
+    void close_with(std::string reason);
+    bool upgrades(const ReceivedRequest& received);
+
+    const HttpContext& context_;
+    const ConnectionOrigin origin_;
+    const ConnectionPost post_;
+    HttpReader reader_;
+    Outbox outbox_;
+    std::stop_source stop_;
+    std::shared_ptr<Pending> pending_;  ///< the request that has no answer yet
+    std::optional<ReceivedRequest> upgrade_;
+    bool draining_ = false;
+    bool input_ended_ = false;
+    bool closing_ = false;
+    bool dead_ = false;
+    std::string close_reason_;
+    Clock::time_point idle_since_;     ///< connected, or the last answer was written
+    Clock::time_point request_since_;  ///< its first byte came
+    bool had_request_ = false;
+    std::optional<Clock::time_point> write_waits_since_;
+};
+
+/// `context` outlives what the factory makes.
+ProtocolFactory http_protocol(const HttpContext& context);
+
+}  // namespace terrane

@@ -1,0 +1,702 @@
+#include "server/net/listener.h"
+
+#include "protocol/base/check.h"
+#include "server/net/admission.h"
+
+#include <boost/asio.hpp>
+
+#include <array>
+#include <exception>
+#include <optional>
+#include <string>
+#include <thread>
+#include <unordered_set>
+#include <utility>
+
+namespace terrane {
+
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+using Clock = ByteProtocol::Clock;
+
+constexpr std::size_t kReadBytes = 4096;
+/// Plaintext that is encrypted at a time: four records.
+constexpr std::size_t kEncryptBytesMax = std::size_t{64} << 10U;
+/// Writes of one connection in a row, before the others of its thread have their turn.
+constexpr int kWritesInARowMax = 8;
+/// After the last byte is written, the client's own last bytes are read and thrown away for so
+/// long: closing on unread bytes would reset the connection, and the client would lose our last
+/// message.
+constexpr std::chrono::milliseconds kLinger{2'000};
+constexpr std::chrono::milliseconds kAcceptRetry{100};
+
+class Connection;
+
+/// One io thread's loop and the connections that live on it.
+struct Loop {
+    asio::io_context context{1};
+    asio::executor_work_guard<asio::io_context::executor_type> guard{context.get_executor()};
+    asio::steady_timer timer{context};
+    std::unordered_set<std::shared_ptr<Connection>> connections;  // the loop's thread only
+    bool draining = false;                                        // the loop's thread only
+    Bytes plain;                                                  // scratch, the loop's thread only
+};
+
+struct Shared {
+    const ListenOptions options;
+    Admission admission;
+    TrafficCounters traffic;
+    std::atomic<std::uint64_t> next_id = 1;
+
+    void event(const std::string& text) const {
+        if (options.on_event) {
+            options.on_event(text);
+        }
+    }
+
+    void fault(const std::string& text) const {
+        if (options.on_fault) {
+            options.on_fault(text);
+        } else {
+            event(text);
+        }
+    }
+};
+
+/// A socket, its TLS if it has it, and its protocol. Everything on the loop's thread.
+class Connection : public std::enable_shared_from_this<Connection> {
+  public:
+    Connection(Shared& shared, Loop& loop, const ListenPort& port, tcp::socket socket,
+               std::string address)
+        : shared_(shared),
+          loop_(loop),
+          port_(port),
+          socket_(std::move(socket)),
+          origin_{.id = shared.next_id.fetch_add(1, std::memory_order_relaxed),
+                  .address = std::move(address)},
+          connected_(Clock::now()) {}
+
+    /// Already admitted under its address.
+    void start() {
+        loop_.connections.insert(shared_from_this());
+        guarded([this] {
+            error_code ignored;
+            socket_.set_option(tcp::no_delay(true), ignored);
+            socket_.non_blocking(true, ignored);
+            if (port_.tls != nullptr) {
+                auto channel = port_.tls->accept();
+                if (!channel) {
+                    reason_ = channel.error().message;
+                    close();
+                    return;
+                }
+                tls_ = *std::move(channel);
+            }
+            protocol_ = port_.make(origin_, post(), Clock::now());
+            if (loop_.draining) {
+                protocol_->drain();
+            }
+        });
+    }
+
+    void drain() {
+        guarded([this] { protocol_->drain(); });
+    }
+
+    void tick(Clock::time_point now) {
+        guarded([this, now] {
+            if (linger_until_ && now > *linger_until_) {
+                close();
+            } else if (tls_ && !tls_->is_ready()) {
+                if (now - connected_ > shared_.options.tls_handshake) {
+                    shared_.traffic.tls_failed.fetch_add(1, std::memory_order_relaxed);
+                    reason_ = "no TLS handshake in time";
+                    close();
+                }
+            } else {
+                protocol_->tick(now);
+            }
+        });
+    }
+
+    void close() {
+        if (!socket_.is_open()) {
+            return;
+        }
+        error_code ignored;
+        socket_.close(ignored);
+        if (protocol_) {
+            protocol_->end();
+        }
+        shared_.admission.leave(origin_.address);
+        loop_.connections.erase(shared_from_this());
+        report();
+    }
+
+  private:
+    /// Runs a step of the protocol and then whatever reading and writing follows from it. One of
+    /// the places where exceptions end: they end the connection.
+    template <typename Step>
+    void guarded(Step step) {
+        const auto alive = shared_from_this();
+        try {
+            step();
+            pump();
+        } catch (const std::exception& error) {
+            reason_ = std::string("failed: ") + error.what();
+            close();
+        }
+    }
+
+    void report() const {
+        const std::string name = protocol_ ? protocol_->client_name() : std::string();
+        const std::string reason =
+            reason_.empty() && protocol_ ? protocol_->close_reason() : reason_;
+        std::string text =
+            port_.name + " session " + std::to_string(origin_.id) + " of " + origin_.address;
+        text += name.empty() ? "" : " \"" + name + "\"";
+        text += " ended";
+        text += reason.empty() ? "" : ": " + reason;
+        if (reason.starts_with(to_string(ErrorCode::malformed))) {
+            shared_.fault(text);
+        } else {
+            shared_.event(text);
+        }
+    }
+
+    ConnectionPost post() {
+        return [weak = weak_from_this(),
+                executor = loop_.context.get_executor()](std::function<void()> step) {
+            asio::post(executor, [weak, step = std::move(step)] {
+                if (const auto self = weak.lock(); self && self->socket_.is_open()) {
+                    self->guarded(step);
+                }
+            });
+        };
+    }
+
+    void pump() {
+        if (!socket_.is_open() || !protocol_) {
+            return;
+        }
+        int writes = 0;
+        while (!protocol_->is_dead() && !writing_ && writes < kWritesInARowMax && write_some()) {
+            ++writes;
+        }
+        if (!socket_.is_open()) {
+            return;
+        }
+        if (protocol_->is_dead()) {
+            close();
+            return;
+        }
+        if (writes == kWritesInARowMax) {
+            wait_for_room();  // which there is; but others come first
+        }
+        if (!writing_ && protocol_->is_closing() && !linger_until_ && !has_output()) {
+            shut_down();
+        }
+        if (!reading_ && (linger_until_ || protocol_->wants_input() || is_shaking_hands())) {
+            read();
+        }
+    }
+
+    bool is_shaking_hands() const { return tls_ && !tls_->is_ready(); }
+
+    bool has_output() { return (tls_ && !tls_->output().empty()) || protocol_->gather(parts_) > 0; }
+
+    void shut_down() {
+        error_code ignored;
+        if (tls_) {
+            tls_->say_goodbye();
+            const auto farewell = tls_->output();
+            socket_.write_some(asio::buffer(farewell.data(), farewell.size()), ignored);
+            tls_->clear_output();
+        }
+        linger_until_ = Clock::now() + kLinger;
+        socket_.shutdown(tcp::socket::shutdown_send, ignored);
+    }
+
+    void read() {
+        reading_ = true;
+        socket_.async_read_some(
+            asio::buffer(read_buffer_),
+            [self = shared_from_this()](error_code error, std::size_t size_bytes) {
+                self->reading_ = false;
+                if (error && (error != asio::error::eof || self->linger_until_)) {
+                    self->close();
+                    return;
+                }
+                self->guarded([&] {
+                    if (error) {
+                        self->input_ended();
+                    } else {
+                        self->received(std::span(self->read_buffer_).first(size_bytes));
+                    }
+                });
+            });
+    }
+
+    void input_ended() {
+        if (is_shaking_hands()) {
+            close();
+            return;
+        }
+        protocol_->input_ended();
+        if (!protocol_->is_closing() && !protocol_->is_dead() && protocol_->wants_input()) {
+            close();  // it would read for ever
+        }
+    }
+
+    void received(std::span<const std::byte> bytes) {
+        shared_.traffic.bytes_in.fetch_add(bytes.size(), std::memory_order_relaxed);
+        if (linger_until_) {
+            return;
+        }
+        if (!tls_) {
+            deliver(bytes);
+            return;
+        }
+        Bytes& plain = loop_.plain;
+        plain.clear();
+        const auto outcome = tls_->receive(plain, bytes);
+        if (!outcome) {
+            shared_.traffic.tls_failed.fetch_add(1, std::memory_order_relaxed);
+            reason_ = outcome.error().message;
+            error_code ignored;
+            const auto alert = tls_->output().subspan(cipher_written_);
+            socket_.write_some(asio::buffer(alert.data(), alert.size()), ignored);
+            close();
+            return;
+        }
+        deliver(plain);
+        if (tls_->input_ended() && socket_.is_open()) {
+            input_ended();
+        }
+    }
+
+    void deliver(std::span<const std::byte> bytes) {
+        if (bytes.empty() || protocol_->is_closing() || protocol_->is_dead()) {
+            return;
+        }
+        protocol_->receive(bytes, Clock::now());
+    }
+
+    /// Writes what the socket takes at once. False if nothing is left to do, or the rest must wait.
+    bool write_some() {
+        std::size_t size = 0;
+        if (tls_) {
+            if (!encrypt()) {
+                return false;
+            }
+            const auto cipher = tls_->output().subspan(cipher_written_);
+            buffers_.assign(1, asio::const_buffer(cipher.data(), cipher.size()));
+            size = cipher.size();
+        } else {
+            const std::size_t count = protocol_->gather(parts_);
+            buffers_.clear();
+            for (std::size_t i = 0; i < count; ++i) {
+                buffers_.emplace_back(parts_[i].data(), parts_[i].size());
+                size += parts_[i].size();
+            }
+            if (count == 0) {
+                return follow();
+            }
+        }
+        error_code error;
+        const std::size_t sent = socket_.write_some(buffers_, error);
+        if (error == asio::error::would_block || error == asio::error::try_again) {
+            wait_for_room();
+            return false;
+        }
+        if (error) {
+            close();
+            return false;
+        }
+        wrote(sent);
+        if (sent < size) {
+            wait_for_room();
+            return false;
+        }
+        return true;
+    }
+
+    /// All is written. True if another protocol has taken over and may have something to say.
+    bool follow() {
+        auto successor = protocol_->take_successor();
+        if (!successor) {
+            return false;
+        }
+        protocol_ = std::move(successor);
+        return true;
+    }
+
+    /// Makes sure that there is ciphertext to write; false if there is none.
+    bool encrypt() {
+        if (!tls_->output().empty()) {
+            return true;
+        }
+        if (!tls_->is_ready()) {
+            return false;
+        }
+        const std::size_t count = protocol_->gather(parts_);
+        if (count == 0) {
+            return follow() && encrypt();
+        }
+        Bytes& plain = loop_.plain;
+        plain.clear();
+        for (std::size_t i = 0; i < count && plain.size() < kEncryptBytesMax; ++i) {
+            const auto part =
+                parts_[i].first(std::min(parts_[i].size(), kEncryptBytesMax - plain.size()));
+            plain.insert(plain.end(), part.begin(), part.end());
+        }
+        if (const auto sent = tls_->send(plain); !sent) {
+            reason_ = sent.error().message;
+            close();
+            return false;
+        }
+        plain_encrypted_ = plain.size();
+        return true;
+    }
+
+    void wrote(std::size_t size_bytes) {
+        shared_.traffic.bytes_out.fetch_add(size_bytes, std::memory_order_relaxed);
+        if (!tls_) {
+            protocol_->written(size_bytes, Clock::now());
+            return;
+        }
+        cipher_written_ += size_bytes;
+        if (cipher_written_ < tls_->output().size()) {
+            return;
+        }
+        tls_->clear_output();
+        cipher_written_ = 0;
+        if (const std::size_t plain = std::exchange(plain_encrypted_, 0); plain > 0) {
+            protocol_->written(plain, Clock::now());
+        }
+    }
+
+    void wait_for_room() {
+        writing_ = true;
+        socket_.async_wait(tcp::socket::wait_write, [self = shared_from_this()](error_code error) {
+            self->writing_ = false;
+            if (error) {
+                self->close();
+                return;
+            }
+            self->guarded([] {});
+        });
+    }
+
+    Shared& shared_;
+    Loop& loop_;
+    const ListenPort& port_;
+    tcp::socket socket_;
+    const ConnectionOrigin origin_;
+    const Clock::time_point connected_;
+    std::unique_ptr<TlsChannel> tls_;
+    std::shared_ptr<ByteProtocol> protocol_;
+    std::array<std::byte, kReadBytes> read_buffer_{};
+    Outbox::Gather parts_;
+    std::vector<asio::const_buffer> buffers_;
+    std::size_t cipher_written_ = 0;   ///< of the channel's output
+    std::size_t plain_encrypted_ = 0;  ///< of the protocol's bytes, in the channel's output
+    bool reading_ = false;
+    bool writing_ = false;
+    std::optional<Clock::time_point> linger_until_;
+    std::string reason_;  ///< why we close, if the protocol doesn't know
+};
+
+/// Tells a client that there is no room, and then reads what it sends until it closes or kLinger is
+/// over: a socket closed on unread bytes takes the message back. On the loop's thread.
+class Refusal : public std::enable_shared_from_this<Refusal> {
+  public:
+    /// Refusals that linger at a time, over all loops; the others go at once.
+    static constexpr int kLingeringMax = 64;
+
+    Refusal(std::atomic<int>& lingering, const ListenPort& port, tcp::socket socket)
+        : lingering_(lingering),
+          port_(port),
+          socket_(std::move(socket)),
+          timer_(socket_.get_executor()) {
+        ++lingering_;
+    }
+
+    ~Refusal() { --lingering_; }
+
+    Refusal(const Refusal&) = delete;
+    Refusal& operator=(const Refusal&) = delete;
+
+    void start() {
+        error_code error;
+        socket_.non_blocking(true, error);
+        if (port_.tls == nullptr) {  // before a handshake nothing can be said
+            socket_.write_some(asio::buffer(port_.refusal), error);
+        }
+        socket_.shutdown(tcp::socket::shutdown_send, error);
+        if (error || lingering_ > kLingeringMax) {
+            return;
+        }
+        timer_.expires_after(kLinger);
+        timer_.async_wait([self = shared_from_this()](error_code) {
+            error_code ignored;
+            self->socket_.close(ignored);
+        });
+        read();
+    }
+
+  private:
+    void read() {
+        socket_.async_read_some(asio::buffer(read_buffer_),
+                                [self = shared_from_this()](error_code error, std::size_t) {
+                                    if (error) {
+                                        self->timer_.cancel();
+                                        return;
+                                    }
+                                    self->read();
+                                });
+    }
+
+    std::atomic<int>& lingering_;
+    const ListenPort& port_;
+    tcp::socket socket_;
+    asio::steady_timer timer_;
+    std::array<std::byte, kReadBytes> read_buffer_{};
+};
+
+/// A port and its listening socket, which lives on the first loop.
+struct Gate {
+    Gate(ListenPort listen_port, asio::io_context& context)
+        : port(std::move(listen_port)), acceptor(context), retry(context) {}
+
+    ListenPort port;
+    Endpoint bound;
+    tcp::acceptor acceptor;
+    asio::steady_timer retry;
+
+    Result<void> bind() {
+        error_code error;
+        const auto address = asio::ip::make_address(port.endpoint.address, error);
+        const tcp::endpoint at(address, port.endpoint.port);
+        if (!error) {
+            acceptor.open(at.protocol(), error);
+        }
+        if (!error) {
+            acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+        }
+        if (!error) {
+            acceptor.bind(at, error);
+        }
+        if (!error) {
+            acceptor.listen(asio::socket_base::max_listen_connections, error);
+        }
+        if (error) {
+            return fail(ErrorCode::io_error, "cannot listen on " + port.name + " " +
+                                                 to_string(port.endpoint) + ": " + error.message());
+        }
+        bound = {.address = port.endpoint.address, .port = acceptor.local_endpoint().port()};
+        return {};
+    }
+
+    void close() {
+        error_code ignored;
+        acceptor.close(ignored);
+        retry.cancel();
+    }
+};
+
+}  // namespace
+
+struct Listener::Impl {
+    Impl(const ListenOptions& options, std::vector<ListenPort> ports)
+        : shared{.options = options,
+                 .admission = {options.sessions_max, options.sessions_per_address_max}} {
+        for (std::size_t i = 0; i < options.io_threads; ++i) {
+            loops.push_back(std::make_unique<Loop>());
+        }
+        for (ListenPort& port : ports) {
+            gates.push_back(std::make_unique<Gate>(std::move(port), loops.front()->context));
+        }
+    }
+
+    ~Impl() {
+        for (const auto& loop : loops) {
+            asio::post(loop->context, [this, &loop = *loop] {
+                close_gates(loop);
+                for (const auto& connection :
+                     std::vector(loop.connections.begin(), loop.connections.end())) {
+                    connection->close();
+                }
+                loop.timer.cancel();
+                loop.context.stop();
+            });
+        }
+        threads.clear();
+    }
+
+    Result<void> bind() {
+        for (const auto& gate : gates) {
+            if (auto bound = gate->bind(); !bound) {
+                return bound;
+            }
+        }
+        return {};
+    }
+
+    void run() {
+        for (const auto& gate : gates) {
+            accept(*gate);
+        }
+        for (const auto& loop : loops) {
+            tick(*loop);
+            threads.emplace_back([this, &context = loop->context] { run(context); });
+        }
+    }
+
+    /// What a handler throws (out of memory, most likely) ends that handler only.
+    void run(asio::io_context& context) const {
+        while (!context.stopped()) {
+            try {
+                context.run();
+            } catch (const std::exception& failure) {
+                shared.event(std::string("a handler failed: ") + failure.what());
+            }
+        }
+    }
+
+    void accept(Gate& gate) {
+        Loop& loop = *loops[next_loop++ % loops.size()];
+        gate.acceptor.async_accept(
+            loop.context, [this, &gate, &loop](error_code error, tcp::socket socket) {
+                if (!gate.acceptor.is_open()) {
+                    return;
+                }
+                if (error) {  // out of descriptors, or the client has gone already
+                    accept_later(gate);
+                    return;
+                }
+                try {
+                    admit(gate, loop, std::move(socket));
+                    accept(gate);
+                } catch (const std::exception& failure) {  // out of memory, most likely
+                    shared.event(std::string("a connection could not be taken: ") + failure.what());
+                    accept_later(gate);
+                }
+            });
+    }
+
+    void accept_later(Gate& gate) {
+        gate.retry.expires_after(kAcceptRetry);
+        gate.retry.async_wait([this, &gate](error_code stopped) {
+            if (!stopped && gate.acceptor.is_open()) {
+                accept(gate);
+            }
+        });
+    }
+
+    void admit(Gate& gate, Loop& loop, tcp::socket socket) {
+        error_code error;
+        const auto remote = socket.remote_endpoint(error);
+        if (error) {
+            return;
+        }
+        const std::string address = remote.address().to_string();
+        if (!shared.admission.enter(address)) {
+            shared.traffic.refused.fetch_add(1, std::memory_order_relaxed);
+            shared.event("refused a session of " + address + ": too many are open");
+            asio::post(loop.context, [refusal = std::make_shared<Refusal>(
+                                          lingering_refusals, gate.port, std::move(socket))] {
+                refusal->start();
+            });
+            return;
+        }
+        std::shared_ptr<Connection> connection;
+        try {
+            connection =
+                std::make_shared<Connection>(shared, loop, gate.port, std::move(socket), address);
+        } catch (...) {
+            shared.admission.leave(address);
+            throw;
+        }
+        shared.traffic.accepted.fetch_add(1, std::memory_order_relaxed);
+        asio::post(loop.context, [connection] { connection->start(); });
+    }
+
+    void tick(Loop& loop) {
+        loop.timer.expires_after(shared.options.tick);
+        loop.timer.async_wait([this, &loop](error_code stopped) {
+            if (stopped) {
+                return;
+            }
+            tick(loop);
+            const auto now = Clock::now();
+            for (const auto& connection :
+                 std::vector(loop.connections.begin(), loop.connections.end())) {
+                connection->tick(now);
+            }
+        });
+    }
+
+    /// The gates are the first loop's.
+    void close_gates(const Loop& loop) {
+        if (&loop == loops.front().get()) {
+            for (const auto& gate : gates) {
+                gate->close();
+            }
+        }
+    }
+
+    Shared shared;
+    std::atomic<int> lingering_refusals = 0;  // before the loops, whose handlers count it down
+    std::vector<std::unique_ptr<Loop>> loops;
+    std::vector<std::unique_ptr<Gate>> gates;
+    std::size_t next_loop = 0;
+    std::vector<std::jthread> threads;
+};
+
+Result<std::unique_ptr<Listener>> Listener::open(const ListenOptions& options,
+                                                 std::vector<ListenPort> ports) {
+    TERRANE_ASSERT(options.io_threads >= 1 && options.io_threads <= kIoThreadsMax);
+    auto impl = std::make_unique<Impl>(options, std::move(ports));
+    if (const auto bound = impl->bind(); !bound) {
+        return tl::unexpected(bound.error());
+    }
+    impl->run();
+    return std::unique_ptr<Listener>(new Listener(std::move(impl)));
+}
+
+Listener::Listener(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Listener::~Listener() = default;
+
+Endpoint Listener::endpoint(std::size_t port_index) const {
+    return impl_->gates.at(port_index)->bound;
+}
+
+std::size_t Listener::sessions() const {
+    return impl_->shared.admission.sessions();
+}
+
+const TrafficCounters& Listener::traffic() const {
+    return impl_->shared.traffic;
+}
+
+bool Listener::drain(std::chrono::milliseconds time) {
+    const auto deadline = Clock::now() + time;
+    for (const auto& loop : impl_->loops) {
+        asio::post(loop->context, [this, &loop = *loop] {
+            impl_->close_gates(loop);
+            loop.draining = true;
+            for (const auto& connection :
+                 std::vector(loop.connections.begin(), loop.connections.end())) {
+                connection->drain();
+            }
+        });
+    }
+    return impl_->shared.admission.wait_until_empty(deadline);
+}
+
+}  // namespace terrane
