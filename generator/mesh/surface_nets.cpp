@@ -112,8 +112,9 @@ class VertexMaker {
 
     /// The vertex of the cell over column `index`, its next in x, and those next in z.
     Vertex at(std::size_t index, std::int32_t floor256) const {
-        const bool is_open =
-            bits_of(lanes_of(columns_.simple_from256.data(), index) > floor256) == 0;
+        // A comparison's lanes are the platform's own integers of that size: long on wasm32.
+        const Lanes is_under = lanes_of(columns_.simple_from256.data(), index) > floor256;
+        const bool is_open = bits_of(is_under) == 0;
         const CellCorners corners =
             is_open ? corners_of_one_end(lanes_of(columns_.top256.data(), index) - floor256)
                     : corners_of_ends(columns_.plane_count, [&](std::size_t plane) {

@@ -45,7 +45,7 @@ constexpr auto kThresholds = [] {
 }();
 
 std::uint8_t encode_srgb(float value) {
-    const auto* above = std::upper_bound(kThresholds.begin(), kThresholds.end(), value);
+    const auto above = std::upper_bound(kThresholds.begin(), kThresholds.end(), value);
     return static_cast<std::uint8_t>(above - kThresholds.begin());
 }
 
