@@ -8,6 +8,7 @@
 #include "server/http/core_routes.h"
 #include "server/http/problem.h"
 #include "server/net/native_protocol.h"
+#include "server/net/websocket_protocol.h"
 #include "server/notice_limit.h"
 #include "storage/memory_store.h"
 #include "storage/rocksdb_store.h"
@@ -165,7 +166,7 @@ struct Server::Impl {
                .counters = &http_counters,
                .next_request_id = &next_request_id,
                .timeouts = options.http_timeouts,
-               .websocket = {},
+               .websocket = websocket_upgrade(sessions),
                .requests_log = &log} {
         add_chunk_routes(router, routes);
         add_world_routes(router, routes);

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -36,6 +37,10 @@ class ByteProtocol {
     virtual void written(std::size_t size_bytes, Clock::time_point now) = 0;
     /// Looks at the deadlines; about once a second.
     virtual void tick(Clock::time_point now) = 0;
+
+    /// When `tick` is wanted sooner than usual; nothing: only events are waited for.
+    virtual std::optional<Clock::time_point> wake_at() const { return std::nullopt; }
+
     /// Takes nothing new, answers what is under way, then closes.
     virtual void drain() = 0;
     /// The connection is gone: cancels what it waits for. Only the destructor may follow.

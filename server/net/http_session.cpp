@@ -1,6 +1,7 @@
 #include "server/net/http_session.h"
 
 #include "server/http/problem.h"
+#include "server/net/websocket_frames.h"
 
 #include <algorithm>
 #include <charconv>
@@ -231,7 +232,8 @@ void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
 
 bool HttpSession::upgrades(const ReceivedRequest& received) {
     return received.request.method == "GET" && received.wants_websocket &&
-           !received.websocket_key.empty() && received.websocket_version == "13" && !draining_;
+           is_websocket_key(received.websocket_key) && received.websocket_version == "13" &&
+           !draining_;
 }
 
 void HttpSession::answer(const Pending& pending, HttpResponse response) {

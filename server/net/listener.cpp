@@ -199,9 +199,31 @@ class Connection : public std::enable_shared_from_this<Connection> {
         if (!writing_ && protocol_->is_closing() && !linger_until_ && !has_output()) {
             shut_down();
         }
+        wake_later();
         if (!reading_ && (linger_until_ || protocol_->wants_input() || is_shaking_hands())) {
             read();
         }
+    }
+
+    /// Has the protocol called when it wants to be.
+    void wake_later() {
+        const auto at = protocol_->wake_at();
+        if (!at || (wakes_at_ && *wakes_at_ <= *at)) {
+            return;
+        }
+        if (!wake_timer_) {
+            wake_timer_.emplace(socket_.get_executor());
+        }
+        wakes_at_ = at;
+        wake_timer_->expires_at(*at);
+        wake_timer_->async_wait([weak = weak_from_this()](error_code stopped) {
+            const auto self = weak.lock();
+            if (stopped || !self || !self->socket_.is_open()) {
+                return;
+            }
+            self->wakes_at_.reset();
+            self->guarded([&] { self->protocol_->tick(Clock::now()); });
+        });
     }
 
     bool is_shaking_hands() const { return tls_ && !tls_->is_ready(); }
@@ -407,6 +429,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     bool reading_ = false;
     bool writing_ = false;
     std::optional<Clock::time_point> linger_until_;
+    std::optional<asio::steady_timer> wake_timer_;  ///< made when it is needed first
+    std::optional<Clock::time_point> wakes_at_;
     std::string reason_;  ///< why we close, if the protocol doesn't know
 };
 
