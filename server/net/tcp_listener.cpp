@@ -115,7 +115,11 @@ struct Shared {
 class Connection : public std::enable_shared_from_this<Connection> {
   public:
     Connection(Shared& shared, Loop& loop, tcp::socket socket, std::string address)
-        : shared_(shared), loop_(loop), socket_(std::move(socket)), address_(std::move(address)) {}
+        : shared_(shared),
+          loop_(loop),
+          socket_(std::move(socket)),
+          address_(std::move(address)),
+          wake_(loop.context) {}
 
     /// Already admitted under its address.
     void start() {
@@ -150,6 +154,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
         }
         error_code ignored;
         socket_.close(ignored);
+        wake_.cancel();
         if (session_) {
             session_->end();
             const std::string& reason = session_->close_reason();
@@ -210,6 +215,26 @@ class Connection : public std::enable_shared_from_this<Connection> {
         if (!reading_ && (linger_until_ || session_->wants_input())) {
             read();
         }
+        wake_later();
+    }
+
+    /// When the session holds back what it could send, it is asked again at the time it names.
+    void wake_later() {
+        const auto at = session_->wake_at();
+        if (at == wake_at_) {
+            return;
+        }
+        wake_at_ = at;
+        wake_.cancel();
+        if (at) {
+            wake_.expires_at(*at);
+            wake_.async_wait([self = shared_from_this()](error_code stopped) {
+                if (!stopped && self->socket_.is_open()) {
+                    self->wake_at_.reset();
+                    self->guarded([&] { self->session_->tick(Clock::now()); });
+                }
+            });
+        }
     }
 
     void read() {
@@ -260,6 +285,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     bool reading_ = false;
     bool writing_ = false;
     std::optional<Clock::time_point> linger_until_;
+    asio::steady_timer wake_;
+    std::optional<Clock::time_point> wake_at_;  ///< what `wake_` is set to
 };
 
 /// Tells a client that there is no room, and then reads what it sends until it closes or kLinger is
