@@ -153,6 +153,8 @@ class WebSocketProtocol final : public ByteProtocol {
         after_step();
     }
 
+    std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
+
     void drain() override {
         draining_ = true;
         session_->drain();
