@@ -1,19 +1,11 @@
 #include "generator/baseline/row_perlin.h"
 
 #include "generator/terrain/random.h"
+#include "protocol/base/clones.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-// A version for each instruction set in one function, chosen when the program starts. Sanitizers do
-// not get on with the resolvers, which run before they are ready.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
-    !defined(__clang__)
-#define TERRANE_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define TERRANE_CLONES
-#endif
 
 namespace terrane {
 namespace {

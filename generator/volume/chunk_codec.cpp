@@ -45,11 +45,11 @@ std::size_t least_bytes(std::size_t limits) {
     return (limits + kLimitsPerByteMax - 1) / kLimitsPerByteMax;
 }
 
-void put_columns(Bytes& out, const ColumnGrid& columns, const Palette& palette,
-                 const ColumnsLayout& layout) {
+void put_columns(ColumnEncoder& encoder, Bytes& out, const ColumnGrid& columns,
+                 const Palette& palette, const ColumnsLayout& layout) {
     TERRANE_ASSERT(columns.width == layout.width && columns.length == layout.length);
     TERRANE_ASSERT(columns.limits.size() <= kLimitsMax);
-    encode_columns(out, columns, palette, layout);
+    encoder.encode(out, columns, palette, layout);
     out.resize(std::max(out.size(), least_bytes(columns.limits.size())));
 }
 
@@ -220,7 +220,7 @@ struct Head {
 
 Head read_head(RecordReader& in) {
     if (in.byte() != kChunkFormatVersion) {
-        in.refuse(ErrorCode::version_mismatch, "record: not of chunk format version 1");
+        in.refuse(ErrorCode::version_mismatch, "record: not of chunk format version 2");
     }
     const std::uint8_t kind = in.byte();
     const std::uint8_t flags = in.byte();
@@ -268,7 +268,7 @@ std::int32_t highest_limit(const Stack& stack) {
 
 }  // namespace
 
-void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
+void ChunkEncoder::encode(Bytes& out, const Chunk& chunk, FlowPlane flow) {
     const bool with_flow = flow == FlowPlane::with && !chunk.uniform;
     out.clear();
     ByteWriter writer(out);
@@ -291,7 +291,15 @@ void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
         writer.varint(id - next);
         next = std::uint64_t{id} + 1;
     }
-    put_columns(out, chunk.columns, chunk.palette, chunk_layout(chunk.side, with_flow));
+    put_columns(columns_, out, chunk.columns, chunk.palette, chunk_layout(chunk.side, with_flow));
+}
+
+void encode_chunk(Bytes& out, const Chunk& chunk, FlowPlane flow) {
+    ChunkEncoder().encode(out, chunk, flow);
+}
+
+void encode_stack(Bytes& out, const Stack& stack) {
+    ChunkEncoder().encode(out, stack);
 }
 
 Result<Chunk> decode_chunk(std::span<const std::byte> bytes, std::size_t materials_max) {
@@ -322,7 +330,7 @@ Result<Chunk> decode_chunk(std::span<const std::byte> bytes, std::size_t materia
     return chunk;
 }
 
-void encode_stack(Bytes& out, const Stack& stack) {
+void ChunkEncoder::encode(Bytes& out, const Stack& stack) {
     out.clear();
     ByteWriter writer(out);
     put_head(writer, RecordKind::stack, true);
@@ -332,7 +340,7 @@ void encode_stack(Bytes& out, const Stack& stack) {
     writer.varint(static_cast<std::uint64_t>(stack.side));
     writer.varint(zigzag(stack.highest_y256));
     put_palette(writer, stack.palette);
-    put_columns(out, stack.columns, stack.palette, stack_layout(stack.side));
+    put_columns(columns_, out, stack.columns, stack.palette, stack_layout(stack.side));
 }
 
 Result<Stack> decode_stack(std::span<const std::byte> bytes, std::size_t materials_max) {

@@ -1,10 +1,11 @@
 // Chunks and stacks as bytes. The layout, byte by byte, is in CHUNK_FORMAT.md.
 //
-// Threads: every function from any thread; nothing is shared. Built without exceptions in mind:
-// every decoding error is a Result.
+// Threads: every free function from any thread; nothing is shared. Built without exceptions in
+// mind: every decoding error is a Result.
 #pragma once
 
 #include "generator/volume/chunk.h"
+#include "generator/volume/column_encoder.h"
 #include "generator/volume/stack.h"
 #include "protocol/base/bytes.h"
 #include "protocol/base/result.h"
@@ -15,7 +16,7 @@
 
 namespace terrane {
 
-inline constexpr std::uint8_t kChunkFormatVersion = 1;
+inline constexpr std::uint8_t kChunkFormatVersion = 2;
 
 /// The flow is a plane of its own and may be left out; it then decodes as 0.
 enum class FlowPlane : std::uint8_t { with, without };
@@ -26,6 +27,18 @@ inline constexpr std::size_t kLimitsMax = std::size_t{1} << 24U;
 /// No encoding of less than a byte for 32 limits is accepted (or made: the encoder pads), so that a
 /// small payload can't ask for much memory.
 inline constexpr std::size_t kLimitsPerByteMax = 32;
+
+/// Encodes record after record without allocating anything but what `out` grows. One thread's; its
+/// contents never change results.
+class ChunkEncoder {
+  public:
+    /// As encode_chunk and encode_stack, below.
+    void encode(Bytes& out, const Chunk& chunk, FlowPlane flow = FlowPlane::with);
+    void encode(Bytes& out, const Stack& stack);
+
+  private:
+    ColumnEncoder columns_;
+};
 
 /// `out` is overwritten. The bytes are a pure function of the chunk; with the flow they are what
 /// `terrane verify` hashes, and they are what COLUMNS payloads carry (before zstd). Needs what

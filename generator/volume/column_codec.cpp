@@ -1,5 +1,7 @@
 #include "generator/volume/column_codec.h"
 
+#include "generator/volume/column_encoder.h"
+#include "generator/volume/derived_heights.h"
 #include "generator/volume/exceptions.h"
 #include "generator/volume/plane_coder.h"
 #include "generator/volume/signatures.h"
@@ -15,8 +17,6 @@
 
 namespace terrane {
 namespace {
-
-constexpr std::int32_t kBlendMost = 256;
 
 /// One slot of one run, or a part of it: `values` has `count` of them.
 struct SlotCells {
@@ -55,58 +55,6 @@ class PlaneCells {
     std::vector<SlotCells> cells_;
 };
 
-/// The paper's 4.3: a layer blends over its own local thickness times its blend value.
-std::uint32_t blended(std::uint32_t bottom_bits, std::uint32_t top_bits, std::int32_t blend) {
-    const auto bottom = static_cast<std::int32_t>(bottom_bits);
-    const auto top = static_cast<std::int32_t>(top_bits);
-    const std::int64_t thickness = std::int64_t{top} - bottom;
-    const std::int64_t end = bottom + std::max<std::int64_t>(1, (thickness * blend + 128) >> 8);
-    return static_cast<std::uint32_t>(std::min<std::int64_t>(end, top));
-}
-
-/// `at` is a height of a slot that is derived, those of the slots beside it lie `length` away.
-std::uint32_t predicted_height(const std::uint32_t* at, std::size_t length,
-                               const HeightSlot& slot) {
-    const std::uint32_t bottom = *(at - length);
-    return slot.role == HeightRole::floor ? bottom : blended(bottom, at[length], slot.blend);
-}
-
-/// The least B with (thickness * B + 128) >> 8 >= end, within 0..256.
-std::int32_t fitting_blend(std::int64_t thickness, std::int64_t end) {
-    const std::int64_t blend = (256 * end - 128 + thickness - 1) / thickness;
-    return static_cast<std::int32_t>(std::clamp<std::int64_t>(blend, 0, kBlendMost));
-}
-
-/// The blend of each palette entry, found from the thickest interval that shows it; 0 if none does.
-std::vector<std::int32_t> fit_blends(const SignatureRuns& runs, const Palette& palette,
-                                     SlotValues& values) {
-    constexpr std::int64_t kThickEnough = 1024;  // then there is only one blend that fits
-    std::vector<std::int32_t> blends(palette.size(), 0);
-    std::vector<std::int64_t> thickest(palette.size(), 0);
-    for (const SignatureRun& run : runs.runs) {
-        const auto ids = runs.table[run.signature];
-        for (std::size_t slot = 1; slot + 1 < ids.size(); ++slot) {
-            const std::uint16_t id = ids[slot];
-            if (ids[slot - 1] == id || ids[slot + 1] != id || thickest[id] >= kThickEnough ||
-                !may_blend(palette[ids[slot - 1]], palette[id])) {
-                continue;
-            }
-            const std::uint32_t* middle = values.heights(run, slot);
-            for (std::uint32_t i = 0; i < run.length; ++i) {
-                const std::int64_t bottom = static_cast<std::int32_t>(*(middle + i - run.length));
-                const std::int64_t thickness =
-                    static_cast<std::int32_t>(middle[i + run.length]) - bottom;
-                if (thickness > thickest[id]) {
-                    thickest[id] = thickness;
-                    blends[id] =
-                        fitting_blend(thickness, static_cast<std::int32_t>(middle[i]) - bottom);
-                }
-            }
-        }
-    }
-    return blends;
-}
-
 PlaneCells height_planes(const SignatureRuns& runs, const SlotRoles& roles, SlotValues& values) {
     PlaneCells planes(roles.height_plane_count);
     const auto for_each = [&](auto visit) {
@@ -133,7 +81,7 @@ PlaneCells height_planes(const SignatureRuns& runs, const SlotRoles& roles, Slot
 void mark_plane(Plane& plane, std::span<const SlotCells> parts) {
     plane.clear();
     for (const SlotCells& part : parts) {
-        plane.mark(part.z, part.x, part.count);
+        plane.view().mark(part.z, part.x, part.count);
     }
 }
 
@@ -153,55 +101,17 @@ void for_each_derived_height(const SignatureRuns& runs, const SlotRoles& roles, 
     }
 }
 
-void add_height_exceptions(Exceptions& exceptions, const std::uint32_t* heights, std::size_t length,
-                           const HeightSlot& slot) {
-    std::uint32_t any = 0;
-    for (std::size_t i = 0; i < length; ++i) {
-        any |= heights[i] ^ predicted_height(heights + i, length, slot);
-    }
-    if (any == 0) {
-        exceptions.agree(length);
-        return;
-    }
-    for (std::size_t i = 0; i < length; ++i) {
-        const std::uint32_t residual = heights[i] - predicted_height(heights + i, length, slot);
-        if (residual == 0) {
-            exceptions.agree(1);
-        } else {
-            exceptions.add(zigzag(static_cast<std::int32_t>(residual)));
-        }
-    }
-}
-
-void encode_heights_section(Bytes& out, SlotValues& values, const SignatureRuns& runs,
-                            const SlotRoles& roles, Plane& plane) {
-    const PlaneCells planes = height_planes(runs, roles, values);
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-        mark_plane(plane, planes[i]);
-        for (const SlotCells& part : planes[i]) {
-            std::copy_n(part.values, part.count, plane.row(part.z) + part.x);
-        }
-        encode_heights(out, plane);
-    }
-    Exceptions exceptions;
-    for_each_derived_height(
-        runs, roles, values,
-        [&](const std::uint32_t* heights, std::size_t length, const HeightSlot& slot) {
-            add_height_exceptions(exceptions, heights, length, slot);
-        });
-    exceptions.append_to(out);
-}
-
 bool decode_heights_section(SlotValues& values, ByteReader& in, const SignatureRuns& runs,
                             const SlotRoles& roles, Plane& plane) {
     const PlaneCells planes = height_planes(runs, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
-        if (!decode_heights(plane, in)) {
+        const PlaneView view = plane.view();
+        if (!decode_heights(view, in)) {
             return false;
         }
         for (const SlotCells& part : planes[i]) {
-            std::copy_n(plane.row(part.z) + part.x, part.count, part.values);
+            std::copy_n(view.row(part.z) + part.x, part.count, part.values);
         }
     }
     ExceptionReader exceptions(in);
@@ -304,66 +214,18 @@ void for_each_derived_flow(const SignatureRuns& runs, std::span<const FlowRun> c
         });
 }
 
-void add_flow_exceptions(Exceptions& exceptions, const std::uint32_t* flows,
-                         const std::uint32_t* predicted, std::size_t count) {
-    if (std::equal(flows, flows + count, predicted)) {
-        exceptions.agree(count);
-        return;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-        if (flows[i] == predicted[i]) {
-            exceptions.agree(1);
-        } else {
-            exceptions.add(flows[i]);
-        }
-    }
-}
-
-// A packed flow's parts: x, y, z.
-constexpr std::array<unsigned, 3> kFlowShifts = {0, 8, 16};
-
-void encode_flow_section(Bytes& out, SlotValues& values, const SignatureRuns& runs,
-                         const SlotRoles& roles, Plane& plane, const ColumnsLayout& layout) {
-    const std::vector<FlowRun> cut = flow_runs(runs, layout);
-    const PlaneCells planes = flow_planes(runs, cut, roles, values);
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-        mark_plane(plane, planes[i]);
-        for (const unsigned shift : kFlowShifts) {
-            for (const SlotCells& part : planes[i]) {
-                std::uint32_t* cells = plane.row(part.z) + part.x;
-                for (std::uint32_t cell = 0; cell < part.count; ++cell) {
-                    cells[cell] = part.values[cell] >> shift;  // coded modulo 256
-                }
-            }
-            encode_bytes(out, plane);
-        }
-    }
-    Exceptions exceptions;
-    for_each_derived_flow(
-        runs, cut, roles, values,
-        [&](const std::uint32_t* flows, const std::uint32_t* predicted, std::size_t count) {
-            add_flow_exceptions(exceptions, flows, predicted, count);
-        });
-    exceptions.append_to(out);
-}
-
 bool decode_flow_section(SlotValues& values, ByteReader& in, const SignatureRuns& runs,
                          const SlotRoles& roles, Plane& plane, const ColumnsLayout& layout) {
     const std::vector<FlowRun> cut = flow_runs(runs, layout);
     const PlaneCells planes = flow_planes(runs, cut, roles, values);
     for (std::size_t i = 0; i < planes.size(); ++i) {
         mark_plane(plane, planes[i]);
-        for (const unsigned shift : kFlowShifts) {
-            if (!decode_bytes(plane, in)) {
-                return false;
-            }
-            for (const SlotCells& part : planes[i]) {
-                const std::uint32_t* cells = plane.row(part.z) + part.x;
-                for (std::uint32_t cell = 0; cell < part.count; ++cell) {
-                    const std::uint32_t bits = (cells[cell] & 0xFFU) << shift;
-                    part.values[cell] = shift == 0 ? bits : part.values[cell] | bits;
-                }
-            }
+        const PlaneView view = plane.view();
+        if (!decode_flows(view, in)) {
+            return false;
+        }
+        for (const SlotCells& part : planes[i]) {
+            std::copy_n(view.row(part.z) + part.x, part.count, part.values);
         }
     }
     ExceptionReader exceptions(in);
@@ -383,19 +245,7 @@ bool decode_flow_section(SlotValues& values, ByteReader& in, const SignatureRuns
 
 void encode_columns(Bytes& out, const ColumnGrid& columns, const Palette& palette,
                     const ColumnsLayout& layout) {
-    const SignatureRuns runs = find_runs(columns);
-    encode_runs(out, runs, static_cast<std::size_t>(layout.width));
-    SlotValues values = split_slots(runs, columns.limits);
-    const std::vector<std::int32_t> blends = fit_blends(runs, palette, values);
-    for (const std::int32_t blend : blends) {
-        ByteWriter(out).varint(static_cast<std::uint64_t>(blend));
-    }
-    const SlotRoles roles = roles_of(runs.table, palette, blends);
-    const auto plane = std::make_unique<Plane>();
-    encode_heights_section(out, values, runs, roles, *plane);
-    if (layout.with_flow) {
-        encode_flow_section(out, values, runs, roles, *plane, layout);
-    }
+    ColumnEncoder().encode(out, columns, palette, layout);
 }
 
 Result<void> decode_columns(ColumnGrid& columns, ByteReader& in, const Palette& palette,
@@ -416,7 +266,8 @@ Result<void> decode_columns(ColumnGrid& columns, ByteReader& in, const Palette& 
         }
         blends.push_back(static_cast<std::int32_t>(*blend));
     }
-    const SlotRoles roles = roles_of(runs.table, palette, blends);
+    SlotRoles roles;
+    RoleFinder().find(roles, runs.table, palette, blends);
     SlotValues values(runs.limit_count);
     const auto plane = std::make_unique<Plane>();
     if (!decode_heights_section(values, in, runs, roles, *plane)) {

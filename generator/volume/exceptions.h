@@ -21,6 +21,12 @@ class Exceptions {
         since_ = 0;
     }
 
+    /// Keeps the memory.
+    void clear() {
+        bytes_.clear();
+        count_ = since_ = 0;
+    }
+
     void append_to(Bytes& out) const {
         ByteWriter(out).varint(count_);
         ByteWriter(out).raw(bytes_);

@@ -1,9 +1,10 @@
 #include "generator/volume/signatures.h"
 
+#include "generator/volume/slot_rows.h"
+
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <unordered_map>
 #include <utility>
 
 namespace terrane {
@@ -21,42 +22,21 @@ bool shows(std::span<const Limit> column, std::span<const std::uint16_t> signatu
                       [](const Limit& limit, std::uint16_t id) { return limit.palette_id == id; });
 }
 
-/// Numbers signatures in order of first use.
-class SignatureFinder {
-  public:
-    explicit SignatureFinder(SignatureTable& table) : table_(table) {}
-
-    std::uint32_t find(std::span<const Limit> column) {
-        std::uint64_t hash = column.size();
-        for (const Limit& limit : column) {
-            hash = (hash ^ limit.palette_id) * 0x9E3779B97F4A7C15U;
-            hash ^= hash >> 32U;
-        }
-        const auto added = static_cast<std::uint32_t>(table_.size());
-        const auto [found, is_new] = latest_.try_emplace(hash, added);
-        for (std::uint32_t id = is_new ? kNone : found->second; id != kNone; id = older_[id]) {
-            if (shows(column, table_[id])) {
-                return id;
-            }
-        }
-        older_.push_back(is_new ? kNone : std::exchange(found->second, added));
-        for (const Limit& limit : column) {
-            table_.palette_ids.push_back(limit.palette_id);
-        }
-        table_.offsets.push_back(static_cast<std::uint32_t>(table_.palette_ids.size()));
-        return added;
+std::uint64_t hash_of(std::span<const Limit> column) {
+    std::uint64_t hash = column.size();
+    for (const Limit& limit : column) {
+        hash = (hash ^ limit.palette_id) * 0x9E3779B97F4A7C15U;
+        hash ^= hash >> 32U;
     }
-
-  private:
-    SignatureTable& table_;
-    std::unordered_map<std::uint64_t, std::uint32_t> latest_;  ///< of one hash
-    std::vector<std::uint32_t> older_;                         ///< the one before of equal hash
-};
+    return hash;
+}
 
 /// The signature of each column of the row above.
 class RowAbove {
   public:
-    explicit RowAbove(std::size_t width) : signatures_(width, kNone) {}
+    RowAbove(std::vector<std::uint32_t>& memory, std::size_t width) : signatures_(memory) {
+        signatures_.assign(width, kNone);
+    }
 
     std::uint32_t at(std::size_t x) const { return signatures_[x]; }
 
@@ -66,13 +46,17 @@ class RowAbove {
     }
 
   private:
-    std::vector<std::uint32_t> signatures_;
+    std::vector<std::uint32_t>& signatures_;
 };
 
 /// Numbers the planes: one per palette entry and class of limit, in order of first use.
 class PlaneNumbers {
   public:
-    explicit PlaneNumbers(std::size_t palette_size) : often_(palette_size * kClassesOften, kNone) {}
+    void reset(std::size_t palette_size) {
+        often_.assign(palette_size * kClassesOften, kNone);
+        rare_.clear();
+        count_ = 0;
+    }
 
     std::uint32_t number(std::uint16_t palette_id, std::uint32_t limit_class) {
         std::uint32_t& plane =
@@ -99,82 +83,6 @@ constexpr std::uint32_t kClassBottom = 0;  ///< the column's first, with its int
 constexpr std::uint32_t kClassCut = 1;     ///< the column's last: a blend whose top is cut off
 constexpr std::uint32_t kClassTop = 2;     ///< + how many tops of this entry lie below
 
-class RoleFinder {
-  public:
-    RoleFinder(const Palette& palette, std::span<const std::int32_t> blends)
-        : palette_(palette),
-          blends_(blends),
-          planes_(palette.size()),
-          flow_planes_(palette.size(), kNone),
-          tops_(palette.size(), 0),
-          first_slots_(palette.size(), kNone) {}
-
-    void add(SlotRoles& roles, std::span<const std::uint16_t> ids) {
-        std::uint32_t layer = kNone;  // the nearest slot of a layer below
-        for (std::size_t slot = 0; slot < ids.size(); ++slot) {
-            roles.heights.push_back(height_slot(ids, slot));
-            roles.flows.push_back(flow_slot(ids[slot], layer));
-            if (first_slots_[ids[slot]] == kNone) {
-                first_slots_[ids[slot]] = static_cast<std::uint32_t>(slot);
-            }
-            if (palette_[ids[slot]].kind == PaletteKind::layer) {
-                layer = static_cast<std::uint32_t>(slot);
-            }
-        }
-        for (const std::uint16_t id : ids) {
-            tops_[id] = 0;
-            first_slots_[id] = kNone;
-        }
-        roles.height_plane_count = planes_.count();
-        roles.flow_plane_count = flow_plane_count_;
-    }
-
-  private:
-    HeightSlot height_slot(std::span<const std::uint16_t> ids, std::size_t slot) {
-        const std::uint16_t id = ids[slot];
-        const bool last = slot + 1 == ids.size();
-        const bool interval_above = !last && ids[slot + 1] == id;
-        if (slot == 0 && interval_above) {
-            return {.plane = planes_.number(id, kClassBottom)};
-        }
-        if (slot == 0 || ids[slot - 1] == id) {
-            return {.plane = planes_.number(id, kClassTop + tops_[id]++)};
-        }
-        if (blends_[id] == 0 || !may_blend(palette_[ids[slot - 1]], palette_[id])) {
-            return {.role = HeightRole::floor};
-        }
-        if (last) {
-            return {.plane = planes_.number(id, kClassCut)};
-        }
-        return interval_above ? HeightSlot{.role = HeightRole::blend, .blend = blends_[id]}
-                              : HeightSlot{.role = HeightRole::floor};
-    }
-
-    FlowSlot flow_slot(std::uint16_t id, std::uint32_t layer) {
-        if (!palette_[id].is_solid()) {
-            return {};
-        }
-        if (first_slots_[id] != kNone) {
-            return {.role = FlowRole::copy, .source = first_slots_[id]};
-        }
-        if (palette_[id].kind == PaletteKind::vein && layer != kNone) {
-            return {.role = FlowRole::copy, .source = layer};
-        }
-        if (flow_planes_[id] == kNone) {
-            flow_planes_[id] = flow_plane_count_++;
-        }
-        return {.role = FlowRole::plane, .source = flow_planes_[id]};
-    }
-
-    const Palette& palette_;
-    std::span<const std::int32_t> blends_;
-    PlaneNumbers planes_;
-    std::vector<std::uint32_t> flow_planes_;  ///< by palette id
-    std::uint32_t flow_plane_count_ = 0;
-    std::vector<std::uint32_t> tops_;         ///< by palette id, within one signature
-    std::vector<std::uint32_t> first_slots_;  ///< likewise
-};
-
 bool decode_table(SignatureTable& table, ByteReader& in, const RunBounds& bounds) {
     const auto count = in.varint();
     if (!count || *count > bounds.width * bounds.length) {
@@ -200,55 +108,177 @@ bool decode_table(SignatureTable& table, ByteReader& in, const RunBounds& bounds
 
 }  // namespace
 
+struct RoleFinder::Buffers {
+    void reset(const Palette& of_palette, std::span<const std::int32_t> of_blends) {
+        palette = &of_palette;
+        blends = of_blends;
+        planes.reset(of_palette.size());
+        flow_planes.assign(of_palette.size(), kNone);
+        flow_plane_count = 0;
+        tops.assign(of_palette.size(), 0);
+        first_slots.assign(of_palette.size(), kNone);
+    }
+
+    void add(SlotRoles& roles, std::span<const std::uint16_t> ids) {
+        std::uint32_t layer = kNone;  // the nearest slot of a layer below
+        for (std::size_t slot = 0; slot < ids.size(); ++slot) {
+            roles.heights.push_back(height_slot(ids, slot));
+            roles.flows.push_back(flow_slot(ids[slot], layer));
+            if (first_slots[ids[slot]] == kNone) {
+                first_slots[ids[slot]] = static_cast<std::uint32_t>(slot);
+            }
+            if ((*palette)[ids[slot]].kind == PaletteKind::layer) {
+                layer = static_cast<std::uint32_t>(slot);
+            }
+        }
+        for (const std::uint16_t id : ids) {
+            tops[id] = 0;
+            first_slots[id] = kNone;
+        }
+        roles.height_plane_count = planes.count();
+        roles.flow_plane_count = flow_plane_count;
+    }
+
+    HeightSlot height_slot(std::span<const std::uint16_t> ids, std::size_t slot) {
+        const std::uint16_t id = ids[slot];
+        const bool last = slot + 1 == ids.size();
+        const bool interval_above = !last && ids[slot + 1] == id;
+        if (slot == 0 && interval_above) {
+            return {.plane = planes.number(id, kClassBottom)};
+        }
+        if (slot == 0 || ids[slot - 1] == id) {
+            return {.plane = planes.number(id, kClassTop + tops[id]++)};
+        }
+        if (blends[id] == 0 || !may_blend((*palette)[ids[slot - 1]], (*palette)[id])) {
+            return {.role = HeightRole::floor};
+        }
+        if (last) {
+            return {.plane = planes.number(id, kClassCut)};
+        }
+        return interval_above ? HeightSlot{.role = HeightRole::blend, .blend = blends[id]}
+                              : HeightSlot{.role = HeightRole::floor};
+    }
+
+    FlowSlot flow_slot(std::uint16_t id, std::uint32_t layer) {
+        if (!(*palette)[id].is_solid()) {
+            return {};
+        }
+        if (first_slots[id] != kNone) {
+            return {.role = FlowRole::copy, .source = first_slots[id]};
+        }
+        if ((*palette)[id].kind == PaletteKind::vein && layer != kNone) {
+            return {.role = FlowRole::copy, .source = layer};
+        }
+        if (flow_planes[id] == kNone) {
+            flow_planes[id] = flow_plane_count++;
+        }
+        return {.role = FlowRole::plane, .source = flow_planes[id]};
+    }
+
+    const Palette* palette = nullptr;
+    std::span<const std::int32_t> blends;
+    PlaneNumbers planes;
+    std::vector<std::uint32_t> flow_planes;  ///< by palette id
+    std::uint32_t flow_plane_count = 0;
+    std::vector<std::uint32_t> tops;         ///< by palette id, within one signature
+    std::vector<std::uint32_t> first_slots;  ///< likewise
+};
+
 bool may_blend(const PaletteEntry& below, const PaletteEntry& above) {
     return below.kind == PaletteKind::layer && !below.alone && above.is_solid() && !above.alone;
 }
 
-SlotRoles roles_of(const SignatureTable& table, const Palette& palette,
-                   std::span<const std::int32_t> blends) {
-    SlotRoles roles;
-    roles.heights.reserve(table.palette_ids.size());
-    roles.flows.reserve(table.palette_ids.size());
-    RoleFinder finder(palette, blends);
+RoleFinder::RoleFinder() : buffers_(std::make_unique<Buffers>()) {}
+
+RoleFinder::~RoleFinder() = default;
+
+void RoleFinder::find(SlotRoles& roles, const SignatureTable& table, const Palette& palette,
+                      std::span<const std::int32_t> blends) {
+    roles.heights.clear();
+    roles.flows.clear();
+    buffers_->reset(palette, blends);
     for (std::size_t i = 0; i < table.size(); ++i) {
-        finder.add(roles, table[i]);
+        buffers_->add(roles, table[i]);
     }
-    return roles;
+    roles.height_plane_count = buffers_->planes.count();
+    roles.flow_plane_count = buffers_->flow_plane_count;
 }
 
-SignatureRuns find_runs(const ColumnGrid& columns) {
-    SignatureRuns found;
-    SignatureFinder finder(found.table);
-    RowAbove above(static_cast<std::size_t>(columns.width));
+void RunFinder::insert(std::uint32_t signature) {
+    const std::size_t mask = buckets_.size() - 1;
+    std::size_t at = static_cast<std::size_t>(hashes_[signature]) & mask;
+    while (buckets_[at] != 0) {
+        at = (at + 1) & mask;
+    }
+    buckets_[at] = signature + 1;
+}
+
+std::uint32_t RunFinder::number_of(SignatureTable& table, std::span<const Limit> column) {
+    const std::uint64_t hash = hash_of(column);
+    const std::size_t mask = buckets_.size() - 1;
+    for (std::size_t at = static_cast<std::size_t>(hash) & mask; buckets_[at] != 0;
+         at = (at + 1) & mask) {
+        const std::uint32_t known = buckets_[at] - 1;
+        if (hashes_[known] == hash && shows(column, table[known])) {
+            return known;
+        }
+    }
+    const auto added = static_cast<std::uint32_t>(table.size());
+    for (const Limit& limit : column) {
+        table.palette_ids.push_back(limit.palette_id);
+    }
+    table.offsets.push_back(static_cast<std::uint32_t>(table.palette_ids.size()));
+    hashes_.push_back(hash);
+    if (2 * hashes_.size() > buckets_.size()) {
+        buckets_.assign(2 * buckets_.size(), 0);
+        for (std::uint32_t i = 0; i < added; ++i) {
+            insert(i);
+        }
+    }
+    insert(added);
+    return added;
+}
+
+void RunFinder::find(SignatureRuns& found, const ColumnGrid& columns) {
+    constexpr std::size_t kBucketsAtFirst = 256;
+    found.table.clear();
+    found.runs.clear();
+    hashes_.clear();
+    buckets_.assign(kBucketsAtFirst, 0);
+    const auto width = static_cast<std::uint32_t>(columns.width);
+    const auto length = static_cast<std::uint32_t>(columns.length);
+    RowAbove above(above_, width);
     const std::span limits = columns.limits;
-    std::uint32_t column = 0;
-    for (std::uint32_t z = 0; z < static_cast<std::uint32_t>(columns.length); ++z) {
+    const std::uint32_t* offset = columns.offsets.data();
+    for (std::uint32_t z = 0; z < length; ++z, offset += width) {
         const std::size_t row_begin = found.runs.size();
-        for (std::uint32_t x = 0; x < static_cast<std::uint32_t>(columns.width); ++x, ++column) {
-            const std::uint32_t begin = columns.offsets[column];
-            const auto shown = limits.subspan(begin, columns.offsets[column + 1] - begin);
-            if (found.runs.size() > row_begin &&
-                shows(shown, found.table[found.runs.back().signature])) {
-                ++found.runs.back().length;
-                continue;
+        for (std::uint32_t x = 0; x < width;) {
+            const std::uint32_t begin = offset[x];
+            const std::uint32_t slots = offset[x + 1] - begin;
+            std::uint32_t end = x + 1;
+            while (end < width && offset[end + 1] - offset[end] == slots) {
+                ++end;
             }
+            const auto shown = limits.subspan(begin, slots);
+            const auto alike =
+                static_cast<std::uint32_t>(count_alike(shown.data(), slots, end - x));
             const std::uint32_t upper = above.at(x);
             const bool same = upper != kNone && shows(shown, found.table[upper]);
-            found.runs.push_back({.signature = same ? upper : finder.find(shown),
+            found.runs.push_back({.signature = same ? upper : number_of(found.table, shown),
                                   .z = z,
                                   .x = x,
-                                  .length = 1,
+                                  .length = alike,
                                   .first_limit = begin});
+            x += alike;
         }
         for (std::size_t run = row_begin; run < found.runs.size(); ++run) {
             above.set(found.runs[run]);
         }
     }
     found.limit_count = limits.size();
-    return found;
 }
 
-void encode_runs(Bytes& out, const SignatureRuns& runs, std::size_t width) {
+void RunFinder::encode(Bytes& out, const SignatureRuns& runs, std::size_t width) {
     ByteWriter writer(out);
     writer.varint(runs.table.size());
     for (std::size_t i = 0; i < runs.table.size(); ++i) {
@@ -257,7 +287,7 @@ void encode_runs(Bytes& out, const SignatureRuns& runs, std::size_t width) {
             writer.varint(id);
         }
     }
-    RowAbove above(width);
+    RowAbove above(above_, width);
     std::uint32_t next_new = 0;
     for (const SignatureRun& run : runs.runs) {
         if (run.signature == next_new) {
@@ -277,7 +307,8 @@ bool decode_runs(SignatureRuns& runs, ByteReader& in, const RunBounds& bounds) {
     if (!decode_table(runs.table, in, bounds)) {
         return false;
     }
-    RowAbove above(bounds.width);
+    std::vector<std::uint32_t> memory;
+    RowAbove above(memory, bounds.width);
     std::uint32_t next_new = 0;
     for (std::uint32_t z = 0; z < bounds.length; ++z) {
         for (std::uint32_t x = 0; x < bounds.width;) {

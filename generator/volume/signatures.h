@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,11 @@ struct SignatureTable {
 
     std::span<const std::uint16_t> operator[](std::size_t i) const {
         return std::span(palette_ids).subspan(offsets[i], offsets[i + 1] - offsets[i]);
+    }
+
+    void clear() {
+        offsets.assign(1, 0);
+        palette_ids.clear();
     }
 };
 
@@ -80,14 +86,37 @@ struct SlotRoles {
 /// void, cave or alone, and below is a layer (the paper, 4.3).
 bool may_blend(const PaletteEntry& below, const PaletteEntry& above);
 
-/// `blends` has the blend (0..256) of each palette entry.
-SlotRoles roles_of(const SignatureTable& table, const Palette& palette,
-                   std::span<const std::int32_t> blends);
+/// Gives signatures their roles. Reused, it allocates nothing. One thread's.
+class RoleFinder {
+  public:
+    RoleFinder();
+    ~RoleFinder();
 
-/// Finds the signatures of `columns`.
-SignatureRuns find_runs(const ColumnGrid& columns);
+    /// Overwrites `roles`. `blends` has the blend (0..256) of each palette entry.
+    void find(SlotRoles& roles, const SignatureTable& table, const Palette& palette,
+              std::span<const std::int32_t> blends);
 
-void encode_runs(Bytes& out, const SignatureRuns& runs, std::size_t width);
+  private:
+    struct Buffers;
+    std::unique_ptr<Buffers> buffers_;
+};
+
+/// Finds signatures and writes them. Reused, it allocates nothing. One thread's.
+class RunFinder {
+  public:
+    /// Overwrites `found` with the runs of `columns`.
+    void find(SignatureRuns& found, const ColumnGrid& columns);
+
+    void encode(Bytes& out, const SignatureRuns& runs, std::size_t width);
+
+  private:
+    std::uint32_t number_of(SignatureTable& table, std::span<const Limit> column);
+    void insert(std::uint32_t signature);
+
+    std::vector<std::uint32_t> above_;    ///< the signature of each column of the row above
+    std::vector<std::uint64_t> hashes_;   ///< of each signature
+    std::vector<std::uint32_t> buckets_;  ///< open addressing: signature + 1, or 0
+};
 
 /// The largest rectangle and the largest number of limits to accept.
 struct RunBounds {

@@ -2,24 +2,6 @@
 
 namespace terrane {
 
-SlotValues split_slots(const SignatureRuns& runs, std::span<const Limit> limits) {
-    SlotValues values(limits.size());
-    for (const SignatureRun& run : runs.runs) {
-        const std::size_t slots = runs.table.slots(run.signature);
-        std::uint32_t* heights = values.heights(run, 0);
-        std::uint32_t* flows = values.flows(run, 0);
-        const Limit* limit = limits.data() + run.first_limit;
-        for (std::uint32_t i = 0; i < run.length; ++i) {
-            for (std::size_t at = i; at < slots * run.length; at += run.length) {
-                heights[at] = static_cast<std::uint32_t>(limit->y256);
-                flows[at] = pack(limit->flow);
-                ++limit;
-            }
-        }
-    }
-    return values;
-}
-
 void join_slots(ColumnGrid& columns, SlotValues& values, const SignatureRuns& runs) {
     columns.limits.resize(runs.limit_count);
     columns.offsets.assign(1, 0);

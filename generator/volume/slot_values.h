@@ -52,9 +52,6 @@ inline Flow unpack(std::uint32_t bits) {
             .z = static_cast<std::int8_t>(bits >> 16U)};
 }
 
-/// Needs the runs of these limits.
-SlotValues split_slots(const SignatureRuns& runs, std::span<const Limit> limits);
-
 /// Overwrites the columns' offsets and limits.
 void join_slots(ColumnGrid& columns, SlotValues& values, const SignatureRuns& runs);
 

@@ -5,6 +5,7 @@
 #include "generator/terrain/load_world.h"
 #include "generator/volume/chunk_codec.h"
 #include "protocol/base/check.h"
+#include "tests/bench/bench_world.h"
 #include "tests/bench/ratios.h"
 
 #include <benchmark/benchmark.h>
@@ -153,6 +154,47 @@ const bench::RatioEntry kEncodeRatio{
      .denominator = "generate_stacks",
      .bar = 4.0}};
 
+/// The 256-high world: `density` of veins and caves in hundredths.
+void generate_high(benchmark::State& state) {
+    const auto world = bench::high_world(static_cast<double>(state.range(0)) / 100);
+    StackGenerator generator(*world);
+    Stack stack;
+    std::int32_t i = 0;
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(
+            generator.generate(stack, {.lod = 0, .x = i % 16, .z = i / 16 % 16}));
+        ++i;
+    }
+}
+
+std::vector<Stack> high_stacks(double density) {
+    const auto world = bench::high_world(density);
+    StackGenerator generator(*world);
+    std::vector<Stack> stacks(8);
+    for (std::size_t i = 0; i < stacks.size(); ++i) {
+        const auto x = static_cast<std::int32_t>(i);
+        const bool made = generator.generate(stacks[i], {.lod = 0, .x = x, .z = 3}).has_value();
+        TERRANE_ASSERT(made);
+    }
+    return stacks;
+}
+
+void encode_high(benchmark::State& state) {
+    const std::vector<Stack> stacks = high_stacks(static_cast<double>(state.range(0)) / 100);
+    std::vector<Bytes> records(stacks.size());
+    std::size_t i = 0;
+    for (auto _ : state) {
+        encode_stack(records[i % stacks.size()], stacks[i % stacks.size()]);
+        ++i;
+    }
+    for (std::size_t stack = 0; stack < stacks.size(); ++stack) {
+        encode_stack(records[stack], stacks[stack]);
+    }
+    count_sizes(state, records, columns_of(stacks));
+}
+
+BENCHMARK(generate_high)->Arg(0)->Arg(25);
+BENCHMARK(encode_high)->Arg(0)->Arg(25);
 BENCHMARK(generate_stacks);
 BENCHMARK(encode_stacks);
 BENCHMARK(decode_stacks);

@@ -118,7 +118,7 @@ TEST(ChunkCodec, AUniformChunkIsItsHeadAndOnePaletteEntry) {
     chunk.uniform_content.composition.add(3, 1.0);
     chunk.uniform_content.kind = PaletteKind::void_;
     EXPECT_EQ(hex(encoded(chunk)),
-              "010000000104d8042020"
+              "020000000104d8042020"
               "09"
               "03000000000000f03f");
     EXPECT_EQ(encoded(chunk), encoded(chunk, FlowPlane::without));
@@ -128,7 +128,7 @@ TEST(ChunkCodec, AUniformChunkIsItsHeadAndOnePaletteEntry) {
 TEST(ChunkCodec, ATinyChunksBytesStayTheSame) {
     const Chunk chunk = cut(drawn_stack(2, {"aab"}), 0, 4);
     EXPECT_EQ(hex(encoded(chunk)),
-              "0101010005000a0204"
+              "0201010005000a0204"
               "030800000000000000f03f"
               "1001000000000000e83f00000000000000d03f"
               "0903000000000000f03f"
@@ -137,9 +137,9 @@ TEST(ChunkCodec, ATinyChunksBytesStayTheSame) {
               "01000000"
               "000000"
               "0000000000"
-              "008008000000"
-              "00800c000000"
-              "008010000000"
+              "00ff0000008106"
+              "00ff000000810a"
+              "00ff000000810e"
               "00"
               "fe0000000000000000000000"
               "c80000000b0000009c000000"
@@ -318,7 +318,7 @@ TEST(ChunkCodec, WhatItRefusesItNames) {
         const auto decoded = decode_chunk(bytes);
         return decoded ? ErrorCode::internal : decoded.error().code;
     };
-    EXPECT_EQ(code_with(0, 2), ErrorCode::version_mismatch);
+    EXPECT_EQ(code_with(0, 1), ErrorCode::version_mismatch);
     EXPECT_EQ(code_with(1, 2), ErrorCode::malformed);   // a stack
     EXPECT_EQ(code_with(1, 9), ErrorCode::malformed);   // no kind
     EXPECT_EQ(code_with(2, 2), ErrorCode::malformed);   // no flag
@@ -403,7 +403,7 @@ TEST(ChunkCodec, ASmallRecordCannotAskForManyLimits) {
     // A signature of 4,000 limits, 64 x 64 times over: 16 million limits out of 8,000 bytes.
     Bytes bytes;
     ByteWriter out(bytes);
-    for (const unsigned head : {1U, 1U, 0U, 0U, 0U, 0U, 0U, 64U, 64U}) {
+    for (const unsigned head : {2U, 1U, 0U, 0U, 0U, 0U, 0U, 64U, 64U}) {
         out.varint(head);
     }
     out.varint(2);
@@ -432,21 +432,53 @@ TEST(ChunkCodec, ASmallRecordCannotAskForManyLimits) {
 TEST(PlaneCoder, SmoothSurfacesCostAByteACell) {
     const auto plane = std::make_unique<Plane>();
     for (std::uint32_t z = 0; z < 66; ++z) {
-        plane->mark(z, 0, 66);
+        plane->view().mark(z, 0, 66);
         for (std::uint32_t x = 0; x < 66; ++x) {
-            plane->row(z)[x] = 100000U + x * x * 3 - z * z * 2 + x * z * 5;
+            plane->view().row(z)[x] = 100000U + x * x * 3 - z * z * 2 + x * z * 5;
         }
     }
     Bytes bytes;
-    encode_heights(bytes, *plane);
-    EXPECT_EQ(bytes[0], static_cast<std::byte>(PlaneOrder::second));
+    const auto scratch = std::make_unique<PlaneCodes>();
+    encode_heights(bytes, plane->view(), *scratch);
+    EXPECT_EQ(bytes[0], std::byte{1});  // second order, a byte a cell
     EXPECT_LT(bytes.size(), 66 * 66 + 100U);
     const auto decoded = std::make_unique<Plane>();
     decoded->present = plane->present;
     ByteReader reader(bytes);
-    ASSERT_TRUE(decode_heights(*decoded, reader));
+    ASSERT_TRUE(decode_heights(decoded->view(), reader));
     EXPECT_EQ(decoded->values, plane->values);
     EXPECT_EQ(reader.remaining(), 0U);
+}
+
+TEST(PlaneCoder, AnySurfaceComesBack) {
+    // Rough ones take two bytes a cell, wild ones escape from those too; holes are anywhere.
+    std::mt19937 random(test_seed());
+    const auto scratch = std::make_unique<PlaneCodes>();
+    for (const std::uint32_t range : {1U, 100U, 300U, 60000U, 70000000U, 0xFFFFFFFFU}) {
+        for (const unsigned holes_of_8 : {0U, 1U, 6U}) {
+            const auto plane = std::make_unique<Plane>();
+            for (std::size_t z = 0; z < 66; ++z) {
+                for (std::size_t x = 0; x < 66; ++x) {
+                    if (random() % 8 >= holes_of_8) {
+                        plane->view().mark(z, x, 1);
+                        plane->view().row(z)[x] = static_cast<std::uint32_t>(random()) % range;
+                    }
+                }
+            }
+            Bytes bytes;
+            encode_heights(bytes, plane->view(), *scratch);
+            const auto decoded = std::make_unique<Plane>();
+            decoded->present = plane->present;
+            ByteReader reader(bytes);
+            ASSERT_TRUE(decode_heights(decoded->view(), reader));
+            EXPECT_EQ(reader.remaining(), 0U);
+            EXPECT_EQ(decoded->values, plane->values);
+            for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 50) {
+                ByteReader shortened{std::span(bytes).first(size)};
+                EXPECT_FALSE(decode_heights(decoded->view(), shortened)) << size;
+            }
+        }
+    }
 }
 
 class GoldenWorld : public testing::TestWithParam<const char*> {};
