@@ -64,12 +64,11 @@ ServerHello hello_of(const World& world) {
                       .limits = {}};  // every session tells its own
     for (const Material& material : definition.materials) {
         const Rgb8 color = material.color;
-        hello.materials.push_back(
-            {.name = material.name,
-             .color_rgb =
-                 (std::uint32_t{color.r} << 16U) | (std::uint32_t{color.g} << 8U) | color.b,
-             .texture = material.texture,
-             .solid = material.kind != MaterialKind::void_ && material.kind != MaterialKind::cave});
+        hello.materials.push_back({.name = material.name,
+                                   .color_rgb = (std::uint32_t{color.r} << 16U) |
+                                                (std::uint32_t{color.g} << 8U) | color.b,
+                                   .texture = material.texture,
+                                   .solid = is_solid(material.kind)});
     }
     return hello;
 }

@@ -8,7 +8,7 @@
 namespace terrane {
 namespace {
 
-constexpr std::uint16_t kNone = 0xffff;
+constexpr std::uint16_t kNone = kNoPaletteId;
 
 /// Palette id and flow as they lie in a limit behind its height.
 std::uint64_t tail_of(std::size_t id, std::int32_t packed_flow) {
@@ -154,30 +154,6 @@ class ColumnWalk {
     bool on_element_ = false;  ///< the last limit shows an element, not that layer
 };
 
-/// Gives the elements that own limits the ids after the void, in their order. `element_ids` says
-/// which do, and gets the ids.
-void number_elements(const ColumnWriterOutput& out, const Region& region, const World& world) {
-    const std::size_t first_id = world.base_palette.size();
-    out.palette.assign(world.base_palette.begin(), world.base_palette.end());
-    bool all_used = true;
-    for (std::size_t e = 0; e < region.elements.size(); ++e) {
-        if (out.element_ids[e] == kNone) {
-            all_used = false;
-            continue;
-        }
-        out.element_ids[e] = static_cast<std::uint16_t>(out.palette.size());
-        out.palette.push_back(region.elements[e].element().content);
-    }
-    if (all_used) {
-        return;
-    }
-    for (Limit& limit : out.grid.limits) {
-        if (limit.palette_id >= first_id) {
-            limit.palette_id = out.element_ids[limit.palette_id - first_id];
-        }
-    }
-}
-
 /// Limits a column can have at most: two a layer and one where it begins, three an element, the
 /// void's.
 std::size_t column_limits_max(const Region& region, std::size_t layers) {
@@ -268,6 +244,28 @@ std::int32_t highest_limit(const Region& region, std::size_t layers) {
 }
 
 }  // namespace
+
+void number_elements(const ColumnWriterOutput& out, const Region& region, const World& world) {
+    const std::size_t first_id = world.base_palette.size();
+    out.palette.assign(world.base_palette.begin(), world.base_palette.end());
+    bool all_used = true;
+    for (std::size_t e = 0; e < region.elements.size(); ++e) {
+        if (out.element_ids[e] == kNone) {
+            all_used = false;
+            continue;
+        }
+        out.element_ids[e] = static_cast<std::uint16_t>(out.palette.size());
+        out.palette.push_back(region.elements[e].element().content);
+    }
+    if (all_used) {
+        return;
+    }
+    for (Limit& limit : out.grid.limits) {
+        if (limit.palette_id >= first_id) {
+            limit.palette_id = out.element_ids[limit.palette_id - first_id];
+        }
+    }
+}
 
 void write_columns(const ColumnWriterOutput& out, const Region& region, const World& world,
                    const TerrainConstants& constants, std::int32_t apron,

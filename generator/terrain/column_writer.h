@@ -11,6 +11,9 @@
 
 namespace terrane {
 
+/// No palette is so long.
+inline constexpr std::uint16_t kNoPaletteId = 0xffff;
+
 struct ColumnWriterOutput {
     ColumnGrid& grid;
     Palette& palette;                         ///< layers, void, then the elements that own a limit
@@ -23,5 +26,9 @@ struct ColumnWriterOutput {
 void write_columns(const ColumnWriterOutput& out, const Region& region, const World& world,
                    const TerrainConstants& constants, std::int32_t apron,
                    const RowKernels& kernels);
+
+/// Gives the elements that own limits the ids after the world's own entries, in their order, in the
+/// limits and in the palette. `out.element_ids` says which do (not kNoPaletteId) and gets the ids.
+void number_elements(const ColumnWriterOutput& out, const Region& region, const World& world);
 
 }  // namespace terrane

@@ -1,21 +1,28 @@
 #include "generator/terrain/generate_stack.h"
 
+#include "generator/landscape/landscape.h"
 #include "generator/terrain/column_writer.h"
 #include "generator/terrain/kernels/kernel_choice.h"
 #include "generator/terrain/plot_cache.h"
 
+#include <optional>
 #include <string>
 #include <utility>
 
 namespace terrane {
 
 struct StackGenerator::Buffers {
-    explicit Buffers(const World& world) : constants(world) {}
+    explicit Buffers(const World& world) : constants(world) {
+        if (world.definition.has_landscape()) {
+            landscape.emplace(world);
+        }
+    }
 
     TerrainConstants constants;
     PlotCache plots;
     Region region;
     std::vector<std::uint16_t> element_ids;
+    std::optional<Landscape> landscape;  ///< of worlds that have one
 };
 
 namespace {
@@ -57,6 +64,23 @@ StackGenerator::~StackGenerator() = default;
 StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
 StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
 
+Result<void> StackGenerator::build(const ColumnRectangle& rectangle) {
+    build_region(buffers_->region, *world_, buffers_->constants,
+                 buffers_->landscape ? Landscape::region_for(rectangle) : rectangle,
+                 buffers_->plots, *kernels_);
+    return check_elements(buffers_->region, *world_);
+}
+
+void StackGenerator::write(const ColumnWriterOutput& out, const ColumnRectangle& rectangle,
+                           std::int32_t apron) {
+    if (buffers_->landscape) {
+        buffers_->landscape->write(out, buffers_->region, buffers_->constants, rectangle, apron,
+                                   *kernels_);
+    } else {
+        write_columns(out, buffers_->region, *world_, buffers_->constants, apron, *kernels_);
+    }
+}
+
 Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     if (position.lod < 0 || position.lod > kLodMax) {
         return fail(ErrorCode::unsupported, "level of detail " + std::to_string(position.lod) +
@@ -69,18 +93,16 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     if (auto checked = check_range(rectangle); !checked) {
         return checked;
     }
-    build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
-                 *kernels_);
-    if (auto checked = check_elements(buffers_->region, *world_); !checked) {
-        return checked;
+    if (auto built = build(rectangle); !built) {
+        return built;
     }
     out.position = position;
     out.side = side;
-    write_columns({.grid = out.columns,
-                   .palette = out.palette,
-                   .highest_y256 = out.highest_y256,
-                   .element_ids = buffers_->element_ids},
-                  buffers_->region, *world_, buffers_->constants, 1, *kernels_);
+    write({.grid = out.columns,
+           .palette = out.palette,
+           .highest_y256 = out.highest_y256,
+           .element_ids = buffers_->element_ids},
+          rectangle, 1);
     return {};
 }
 
@@ -88,16 +110,14 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
     if (auto checked = check_range(rectangle); !checked) {
         return checked;
     }
-    build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
-                 *kernels_);
-    if (auto checked = check_elements(buffers_->region, *world_); !checked) {
-        return checked;
+    if (auto built = build(rectangle); !built) {
+        return built;
     }
-    write_columns({.grid = out.columns,
-                   .palette = out.palette,
-                   .highest_y256 = out.highest_y256,
-                   .element_ids = buffers_->element_ids},
-                  buffers_->region, *world_, buffers_->constants, 0, *kernels_);
+    write({.grid = out.columns,
+           .palette = out.palette,
+           .highest_y256 = out.highest_y256,
+           .element_ids = buffers_->element_ids},
+          rectangle, 0);
     return {};
 }
 

@@ -13,6 +13,8 @@
 
 namespace terrane {
 
+struct ColumnWriterOutput;
+
 /// A rectangle's columns and what their limits refer to.
 struct ColumnSet {
     ColumnGrid columns;
@@ -43,6 +45,10 @@ class StackGenerator {
 
   private:
     struct Buffers;
+
+    Result<void> build(const ColumnRectangle& rectangle);
+    void write(const ColumnWriterOutput& out, const ColumnRectangle& rectangle, std::int32_t apron);
+
     const World* world_;
     const RowKernels* kernels_;
     std::unique_ptr<Buffers> buffers_;

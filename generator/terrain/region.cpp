@@ -123,8 +123,10 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
             if (thickness[i] > 0) {
                 region.gap_mask[first + i] |= gap_bit;
                 region.irregular[first + i] = 1;
-                region.stacked[first + i] =
-                    std::max(region.stacked[first + i], height[first + i] + thickness[i]);
+                if (region.elements_lift) {
+                    region.stacked[first + i] =
+                        std::max(region.stacked[first + i], height[first + i] + thickness[i]);
+                }
             }
         }
     }
@@ -192,6 +194,7 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
                    rectangle.length >= 1 && rectangle.length <= kRectangleSideMax - 2);
     const std::size_t layers = world.stack.layers.size();
     region.inner = rectangle;
+    region.elements_lift = world.definition.structure.lift;
     region.shape = {.x0 = rectangle.x0 - rectangle.step(),
                     .z0 = rectangle.z0 - rectangle.step(),
                     .width = rectangle.width + 2,

@@ -44,6 +44,7 @@ struct Region {
     ColumnRectangle inner;
     RectangleShape shape;  ///< inner and its apron of one
     std::int32_t flow_stride = 0;
+    bool elements_lift = true;   ///< veins and caves lift what is above them
     std::vector<float> stacked;  ///< S, the top of the stack so far
     std::vector<float> noise;
     std::vector<float> heights;            ///< K planes of shape.padded_size(): H_k

@@ -1,5 +1,6 @@
 #include "generator/terrain/world.h"
 
+#include "generator/landscape/landscape_palette.h"
 #include "generator/terrain/noise.h"
 #include "generator/world/world_file.h"
 
@@ -18,7 +19,8 @@ double elements_per_region_bound(const WorldDefinition& definition, const LayerS
         return 0;
     }
     const double area = std::max(definition.terrain.vein_area, definition.terrain.cave_area);
-    const double plots = (kRectangleSideMax + area) / definition.grid.plot + 2;
+    constexpr double kSideMax = 128;  // columns
+    const double plots = (kSideMax + area) / definition.grid.plot + 2;
     const double a_plot = 1.5 * (stack.reference_veins + stack.reference_caves) + 2;
     return plots * plots * a_plot;
 }
@@ -29,6 +31,9 @@ Result<World> World::build(WorldDefinition definition) {
     auto stack = build_layer_stack(definition);
     if (!stack) {
         return tl::unexpected(std::move(stack.error()));
+    }
+    if (definition.has_landscape()) {
+        stack->height_bound = landscape_height_bound(definition, *stack);
     }
     if (!(stack->height_bound <= kHeightBoundMax)) {
         return fail(ErrorCode::invalid_argument,
@@ -58,6 +63,9 @@ Result<World> World::build(WorldDefinition definition) {
         }
     }
     world.base_palette.push_back(nothing);
+    if (definition.has_landscape()) {
+        append_landscape_palette(world.base_palette, definition);
+    }
     world.fingerprint = world_fingerprint(definition);
     world.stack = std::move(*stack);
     world.definition = std::move(definition);

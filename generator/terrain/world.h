@@ -24,8 +24,9 @@ inline constexpr double kElementsPerRegionMax = 16384;
 struct World {
     WorldDefinition definition;
     LayerStack stack;
-    Palette base_palette;  ///< layers, then the void: what every stack's palette begins with
-    Hash128 fingerprint;   ///< names definition, textures and generator version
+    /// Layers, the void, then a landscape's own: what every stack's palette begins with.
+    Palette base_palette;
+    Hash128 fingerprint;  ///< names definition, textures and generator version
 
     std::uint16_t void_id() const { return static_cast<std::uint16_t>(stack.layers.size()); }
 

@@ -81,6 +81,59 @@ void add_terrain(std::string& out, const TerrainParameters& terrain) {
     add_number(out, "cave_density", terrain.cave_density);
 }
 
+std::string truth_text(bool value) {
+    return value ? "true" : "false";
+}
+
+void add_relief(std::string& out, const ReliefParameters& relief) {
+    out += "\n[relief]\n";
+    add_number(out, "height", relief.height);
+    add_number(out, "ground", relief.ground);
+    add_number(out, "fall", relief.fall);
+    add_number(out, "valley", relief.valley);
+    add_number(out, "province", relief.province);
+    add_number(out, "plateau", relief.plateau);
+    add_number(out, "rivers", relief.rivers);
+    add_number(out, "gullies", relief.gullies);
+    add_number(out, "gully_scale", relief.gully_scale);
+    add_line(out, "gully_octaves", std::to_string(relief.gully_octaves));
+    add_number(out, "cliffs", relief.cliffs);
+    add_line(out, "overhang", std::to_string(relief.overhang));
+    if (relief.sea_level) {
+        add_number(out, "sea_level", *relief.sea_level);
+    }
+    if (relief.snow_line) {
+        add_number(out, "snow_line", *relief.snow_line);
+    }
+    add_number(out, "soil", relief.soil);
+}
+
+void add_structure(std::string& out, const StructureParameters& structure) {
+    out += "\n[structure]\n";
+    add_number(out, "fold", structure.fold);
+    add_number(out, "fold_length", structure.fold_length);
+    add_number(out, "fold_direction", structure.fold_direction);
+    add_number(out, "fault_density", structure.fault_density);
+    add_number(out, "fault_throw", structure.fault_throw);
+    add_number(out, "fault_length", structure.fault_length);
+    add_number(out, "fault_dip", structure.fault_dip);
+    add_number(out, "sheet", structure.sheet);
+    add_line(out, "lift", truth_text(structure.lift));
+}
+
+void add_caves(std::string& out, const CaveParameters& caves) {
+    out += "\n[caves]\n";
+    add_line(out, "cell", std::to_string(caves.cell));
+    add_number(out, "radius", caves.radius);
+    add_number(out, "density", caves.density);
+    add_number(out, "connect", caves.connect);
+    add_number(out, "shaft", caves.shaft);
+    add_number(out, "chamber", caves.chamber);
+    add_number(out, "sink", caves.sink);
+    add_line(out, "levels", std::to_string(caves.levels));
+    add_number(out, "water_table", caves.water_table);
+}
+
 void add_grid(std::string& out, const Grid& grid) {
     const std::string side = std::to_string(grid.side);
     out += "\n[grid]\n";
@@ -89,7 +142,7 @@ void add_grid(std::string& out, const Grid& grid) {
     add_number(out, "voxel_size_m", grid.voxel_size_m);
 }
 
-void add_material(std::string& out, const Material& material) {
+void add_material(std::string& out, const Material& material, std::int32_t format) {
     const MaterialKeys keys = keys_of(material.kind, material.alone);
     out += "\n[[material]]\n";
     add_line(out, "id", std::to_string(material.id));
@@ -100,7 +153,7 @@ void add_material(std::string& out, const Material& material) {
     }
     add_line(out, "kind", toml_string(to_string(material.kind)));
     if (material.kind != MaterialKind::void_) {
-        add_line(out, "alone", material.alone ? "true" : "false");
+        add_line(out, "alone", truth_text(material.alone));
     }
     if (keys.area) {
         add_number(out, "area", material.area);
@@ -119,6 +172,10 @@ void add_material(std::string& out, const Material& material) {
     }
     if (keys.blend) {
         add_number(out, "blend", material.blend);
+    }
+    if (keys.hardness && format >= 2) {
+        add_number(out, "hardness", material.hardness);
+        add_number(out, "soluble", material.soluble);
     }
 }
 
@@ -166,13 +223,18 @@ void add_bytes(ByteWriter& writer, std::span<const std::byte> bytes) {
 
 std::string canonical_world_file(const WorldDefinition& definition) {
     std::string out;
-    add_line(out, "format", std::to_string(kWorldFileFormat));
+    add_line(out, "format", std::to_string(definition.format));
     add_line(out, "name", toml_string(definition.name));
     add_line(out, "seed", std::to_string(static_cast<std::int64_t>(definition.seed)));
     add_terrain(out, definition.terrain);
+    if (definition.format >= 2) {
+        add_structure(out, definition.structure);
+        add_relief(out, definition.relief);
+        add_caves(out, definition.caves);
+    }
     add_grid(out, definition.grid);
     for (const Material& material : definition.materials) {
-        add_material(out, material);
+        add_material(out, material, definition.format);
     }
     out += "\n[affinity]\n";
     add_affinity(out, "same_layer", definition.materials, definition.same_layer);

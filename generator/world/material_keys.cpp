@@ -18,6 +18,14 @@ std::string_view to_string(MaterialKind kind) {
             return "vein";
         case MaterialKind::cave:
             return "cave";
+        case MaterialKind::soil:
+            return "soil";
+        case MaterialKind::sand:
+            return "sand";
+        case MaterialKind::snow:
+            return "snow";
+        case MaterialKind::water:
+            return "water";
     }
     TERRANE_ASSERT(false);
     return {};
@@ -32,13 +40,19 @@ MaterialKeys keys_of(MaterialKind kind, bool alone) {
                          .blend = !alone};
     switch (kind) {
         case MaterialKind::void_:
+        case MaterialKind::soil:
+        case MaterialKind::sand:
+        case MaterialKind::snow:
+        case MaterialKind::water:
             return {};
         case MaterialKind::base:  // makes the first layer, whose choice ignores depth
             keys.depth = false;
             keys.similarity = true;
+            keys.hardness = true;
             return keys;
         case MaterialKind::regular:
             keys.similarity = true;
+            keys.hardness = true;
             return keys;
         case MaterialKind::vein:
             keys.area = true;

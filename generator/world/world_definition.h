@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,23 @@ inline constexpr std::int32_t kHeightBoundMax = 16384;  ///< voxels
 inline constexpr std::int32_t kChunkSideMin = 4;        ///< columns or voxels
 inline constexpr std::int32_t kChunkSideMax = 64;       ///< columns or voxels
 
-enum class MaterialKind : std::uint8_t { void_, base, regular, vein, cave };
+/// The last four lie on the ground of a landscape (format 2); one of each at most.
+enum class MaterialKind : std::uint8_t {
+    void_,
+    base,
+    regular,
+    vein,
+    cave,
+    soil,
+    sand,
+    snow,
+    water
+};
+
+/// Whether one can stand on it.
+constexpr bool is_solid(MaterialKind kind) {
+    return kind != MaterialKind::void_ && kind != MaterialKind::cave && kind != MaterialKind::water;
+}
 
 /// Least, best and most of a property; 0 <= least <= best <= most <= 1.
 struct Range {
@@ -50,6 +67,8 @@ struct Material {
     Range roughness;
     double similarity = 0;
     double blend = 0;
+    double hardness = 0.5;  ///< 0..1: how a layer of it stands against rivers (format 2)
+    double soluble = 0;     ///< 0..1: how gladly caves form in it (format 2)
 
     friend bool operator==(const Material&, const Material&) = default;
 };
@@ -81,6 +100,57 @@ struct Grid {
     friend bool operator==(const Grid&, const Grid&) = default;
 };
 
+/// Format 2: what became of the stack. Every default leaves it as it was laid down.
+struct StructureParameters {
+    double fold = 0;              ///< voxels: half the height of the folds
+    double fold_length = 400;     ///< columns from crest to crest
+    double fold_direction = 0.1;  ///< turns from +x: across the crests
+    double fault_density = 0;     ///< fractures in 512 x 512 columns
+    double fault_throw = 0;       ///< voxels
+    double fault_length = 400;    ///< columns from the middle to the tip
+    double fault_dip = 3;         ///< tangent of their slope
+    double sheet = 0;             ///< voxels: thickness of mineral sheets on fractures
+    bool lift = true;             ///< veins and caves lift what is above them, as in format 1
+
+    friend bool operator==(const StructureParameters&, const StructureParameters&) = default;
+};
+
+/// Format 2: the surface that rivers cut.
+struct ReliefParameters {
+    double height = 0;        ///< voxels from river to crest; 0 is off: the stack's own top
+    double ground = 0;        ///< voxels: mean height of the rivers
+    double fall = 0;          ///< voxels: their range
+    double valley = 192;      ///< columns between rivers
+    double province = 1536;   ///< columns from plains to mountains
+    double plateau = 0;       ///< 0 crests, 1 table tops
+    double rivers = 0;        ///< columns: half the width of a small river
+    double gullies = 0;       ///< voxels
+    double gully_scale = 96;  ///< columns
+    std::int32_t gully_octaves = 4;
+    double cliffs = 0;          ///< 0..0.8: how far hardness shapes the slopes
+    std::int32_t overhang = 0;  ///< columns: how far hard layers may lean out
+    std::optional<double> sea_level;
+    std::optional<double> snow_line;
+    double soil = 0;  ///< voxels
+
+    friend bool operator==(const ReliefParameters&, const ReliefParameters&) = default;
+};
+
+/// Format 2: caves that join to systems.
+struct CaveParameters {
+    std::int32_t cell = 0;  ///< columns between two nodes; 0 is off
+    double radius = 4;      ///< voxels
+    double density = 0.7;   ///< chance that there is a node in a cell
+    double connect = 0.75;  ///< chance of a tube to the next node
+    double shaft = 0.25;    ///< chance of a shaft to the level above
+    double chamber = 0.2;   ///< chance that a node is a chamber
+    double sink = 0.1;      ///< chance that a node of the highest level opens to the sky
+    std::int32_t levels = 4;
+    double water_table = 3;  ///< voxels below the river: what is deeper is flooded
+
+    friend bool operator==(const CaveParameters&, const CaveParameters&) = default;
+};
+
 /// A texture's bytes as they lie beside the world file; they enter the fingerprint.
 struct Texture {
     std::string name;
@@ -90,9 +160,13 @@ struct Texture {
 };
 
 struct WorldDefinition {
+    std::int32_t format = 1;  ///< of the file; 1 has no structure, relief and caves
     std::string name;
     std::uint64_t seed = 0;  ///< the file's signed integer, cast
     TerrainParameters terrain;
+    StructureParameters structure;
+    ReliefParameters relief;
+    CaveParameters caves;
     Grid grid;
     std::vector<Material> materials;  ///< ascending id; at most kMaterialsMax
     /// Affinities between materials by index, row-major materials x materials, symmetric:
@@ -100,6 +174,12 @@ struct WorldDefinition {
     std::vector<double> same_layer;
     std::vector<double> next_layer;
     std::vector<Texture> textures;  ///< each distinct name once, in order of first use
+
+    /// Whether anything bends, cuts or pierces the stack. If nothing does, columns are format 1's.
+    bool has_landscape() const {
+        return relief.height > 0 || structure.fold > 0 || structure.fault_density > 0 ||
+               caves.cell > 0;
+    }
 
     double same_layer_affinity(std::size_t a, std::size_t b) const {
         return same_layer[a * materials.size() + b];

@@ -6,6 +6,7 @@
 
 #include "generator/world/world_affinities.h"
 #include "generator/world/world_definition.h"
+#include "generator/world/world_landscape.h"
 #include "generator/world/world_materials.h"
 #include "generator/world/world_table.h"
 
@@ -128,7 +129,10 @@ void read_root(const toml::table& root_source, WorldFaults& faults,
                const std::filesystem::path& texture_folder, WorldFileResult& result) {
     WorldDefinition& world = result.definition;
     WorldTable root(root_source, "", faults);
-    root.integer("format", {.least = kWorldFileFormat, .most = kWorldFileFormat}, Need::required);
+    world.format = static_cast<std::int32_t>(
+        root.integer("format", {.least = kWorldFileFormatMin, .most = kWorldFileFormatMax},
+                     Need::required)
+            .value_or(kWorldFileFormatMax));  // what is written is then not refused for the format
     world.name = root.text("name", kNameBytesMax, Need::required).value_or("");
     world.seed =
         static_cast<std::uint64_t>(root.integer("seed",
@@ -144,6 +148,7 @@ void read_root(const toml::table& root_source, WorldFaults& faults,
         root.array("material", "it must be a [[material]] for each material", Need::required);
     const toml::table* affinity =
         root.table("affinity", "it must be a table of affinities", Need::optional);
+    const LandscapeTables landscape = find_landscape(root, world.format);
     root.finish();
 
     Areas areas;
@@ -157,6 +162,7 @@ void read_root(const toml::table& root_source, WorldFaults& faults,
     if (terrain != nullptr && plot) {
         check_areas(*terrain, areas, *plot, faults);
     }
+    read_landscape(landscape, faults, world);
     if (materials != nullptr) {
         read_materials(*materials, texture_folder, faults, world);
         read_affinities(affinity, faults, world);

@@ -14,7 +14,8 @@
 namespace terrane {
 
 /// What a world file may hold. Lengths in voxels; each pair is the least and the most allowed.
-inline constexpr std::int64_t kWorldFileFormat = 1;
+inline constexpr std::int64_t kWorldFileFormatMin = 1;
+inline constexpr std::int64_t kWorldFileFormatMax = 2;
 inline constexpr std::size_t kWorldFileBytesMax = std::size_t{1} << 20U;
 inline constexpr std::size_t kTextureBytesMax = std::size_t{4} << 20U;
 /// All textures of a world together: a build holds them in memory.
@@ -34,6 +35,31 @@ inline constexpr std::int64_t kPlotMin = 4;
 inline constexpr std::int64_t kPlotMax = 4096;
 inline constexpr double kVoxelSizeMinM = 0.001;
 inline constexpr double kVoxelSizeMaxM = 1000;
+
+/// Of format 2. Lengths that are not named here are 0 to kLengthScaleMax.
+inline constexpr double kReliefHeightMax = 2048;
+inline constexpr double kValleyMin = 64;
+inline constexpr double kValleyMax = 2048;
+inline constexpr double kProvinceMin = 256;
+inline constexpr double kProvinceMax = 65536;
+inline constexpr double kRiversMax = 16;
+inline constexpr double kGulliesMax = 512;
+inline constexpr double kGullyScaleMin = 16;
+inline constexpr double kCliffsMax = 0.8;
+inline constexpr std::int64_t kOverhangMax = 6;
+inline constexpr double kSoilMax = 64;
+inline constexpr double kFoldMax = 1024;
+inline constexpr double kFoldLengthMin = 32;
+inline constexpr double kFaultDensityMax = 16;
+inline constexpr double kFaultThrowMax = 512;
+inline constexpr double kFaultLengthMin = 16;
+inline constexpr double kFaultDipMin = 1;
+inline constexpr double kFaultDipMax = 8;
+inline constexpr double kSheetMax = 64;
+inline constexpr std::int64_t kCaveCellMin = 32;  ///< or 0: no caves
+inline constexpr std::int64_t kCaveCellMax = 512;
+inline constexpr double kCaveRadiusMax = 24;
+inline constexpr std::int64_t kCaveLevelsMax = 8;
 
 /// One thing wrong in a world file; line and column count from 1. A fault of the whole file stands
 /// at line 1, column 1, a missing key at its table.
@@ -75,7 +101,8 @@ std::string canonical_world_file(const WorldDefinition& definition);
 /// XXH3-128 of the canonical form, the textures' bytes and the generator version.
 Hash128 world_fingerprint(const WorldDefinition& definition);
 
-/// A kind as it stands in a world file: "void", "base", "regular", "vein" or "cave".
+/// A kind as it stands in a world file: "void", "base", "regular", "vein", "cave", "soil", "sand",
+/// "snow" or "water".
 std::string_view to_string(MaterialKind kind);
 
 /// Which of a material's keys mean anything; the others are accepted and ignored.
@@ -86,6 +113,7 @@ struct MaterialKeys {
     bool roughness = false;
     bool similarity = false;
     bool blend = false;
+    bool hardness = false;  ///< and soluble; format 2 only
 };
 
 /// An `alone` material never blends.

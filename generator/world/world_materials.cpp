@@ -27,7 +27,8 @@ namespace terrane {
 namespace {
 
 constexpr std::array kKinds = {MaterialKind::void_, MaterialKind::base, MaterialKind::regular,
-                               MaterialKind::vein, MaterialKind::cave};
+                               MaterialKind::vein,  MaterialKind::cave, MaterialKind::soil,
+                               MaterialKind::sand,  MaterialKind::snow, MaterialKind::water};
 constexpr NumberBounds kShare{.least = 0, .most = 1};
 
 /// What the materials have in common: what may stand only once, and how many there are of a kind.
@@ -38,7 +39,14 @@ struct Seen {
     bool all_kinds_known = true;
     std::map<std::string, std::vector<std::byte>> textures;
     std::size_t textures_bytes = 0;
+    std::int32_t format = 1;
 };
+
+/// Kinds that lie on a landscape's ground: format 2 only, one of each.
+bool is_cover(MaterialKind kind) {
+    return kind == MaterialKind::soil || kind == MaterialKind::sand || kind == MaterialKind::snow ||
+           kind == MaterialKind::water;
+}
 
 std::optional<Rgb8> rgb_from_hex(std::string_view text) {
     if (text.size() != 7 || text[0] != '#') {
@@ -73,7 +81,8 @@ std::optional<MaterialKind> read_kind(WorldTable& table) {
         words.emplace_back(to_string(kind));
     }
     table.fault("kind", "is " + in_quotes(*text) +
-                            "; it must be void, base, regular, vein or cave; the nearest is " +
+                            "; it must be void, base, regular, vein or cave, in format 2 also "
+                            "soil, sand, snow or water; the nearest is " +
                             in_quotes(nearest_word(*text, words)));
     return std::nullopt;
 }
@@ -144,7 +153,8 @@ std::string read_texture(WorldTable& table, const std::filesystem::path& folder,
 }
 
 /// Properties that the kind gives no meaning are checked if they are there, and then left at zero.
-void read_properties(WorldTable& table, std::optional<MaterialKind> kind, Material& material) {
+void read_properties(WorldTable& table, std::optional<MaterialKind> kind, std::int32_t format,
+                     Material& material) {
     const bool alone = table.flag("alone").value_or(false);
     material.alone = alone && kind != MaterialKind::void_;
     const MaterialKeys keys = kind ? keys_of(*kind, material.alone) : MaterialKeys{};
@@ -163,6 +173,12 @@ void read_properties(WorldTable& table, std::optional<MaterialKind> kind, Materi
     range("roughness", keys.roughness, material.roughness);
     share("similarity", keys.similarity, material.similarity);
     share("blend", keys.blend, material.blend);
+    if (format >= 2) {
+        const auto hardness = table.number("hardness", kShare, Need::optional);
+        const auto soluble = table.number("soluble", kShare, Need::optional);
+        material.hardness = keys.hardness ? hardness.value_or(0.5) : 0.5;
+        material.soluble = keys.hardness ? soluble.value_or(0) : 0;
+    }
 }
 
 Material read_material(const toml::table& source, const std::filesystem::path& texture_folder,
@@ -185,13 +201,19 @@ Material read_material(const toml::table& source, const std::filesystem::path& t
         seen.all_kinds_known = false;
     } else if (++seen.kinds[*kind] == 2 && kind == MaterialKind::void_) {
         table.fault("kind", "is \"void\" a second time; exactly one void material is allowed");
+    } else if (is_cover(*kind) && seen.format < 2) {
+        table.fault("kind", "is " + in_quotes(to_string(*kind)) +
+                                "; such materials need format = 2 at the file's head");
+    } else if (is_cover(*kind) && seen.kinds[*kind] == 2) {
+        table.fault("kind", "is " + in_quotes(to_string(*kind)) +
+                                " a second time; one such material is allowed");
     }
     material.id = id.value_or(0);
     material.name = name.value_or("");
     material.kind = kind.value_or(MaterialKind::regular);
     material.color = read_color(table);
     material.texture = read_texture(table, texture_folder, seen);
-    read_properties(table, kind, material);
+    read_properties(table, kind, seen.format, material);
     table.finish();
     return material;
 }
@@ -218,6 +240,7 @@ void check_kinds(const toml::array& source, const Seen& seen, WorldFaults& fault
 void read_materials(const toml::array& source, const std::filesystem::path& texture_folder,
                     WorldFaults& faults, WorldDefinition& world) {
     Seen seen;
+    seen.format = world.format;
     for (const toml::node& node : source) {
         const toml::table* table = node.as_table();
         if (table == nullptr) {

@@ -10,7 +10,8 @@
 
 namespace terrane {
 
-/// Reads the materials and their textures into `world`, ascending by id. What is wrong goes to
+/// Reads the materials and their textures into `world`, whose format is read already, ascending by
+/// id. What is wrong goes to
 /// `faults`; a material with faults is still added, so that affinities can name it.
 void read_materials(const toml::array& source, const std::filesystem::path& texture_folder,
                     WorldFaults& faults, WorldDefinition& world);

@@ -113,8 +113,65 @@ glm::dvec3 sky_light(const Light& light, glm::dvec3 direction) {
     return mix_light(kHorizon, kZenith, clear) + kGlow * glow;
 }
 
-glm::dvec3 surface_light(SceneReader& reader, const Light& light, const Ray& ray, const Hit& hit,
-                         SkyMemory& memory) {
+namespace {
+
+glm::dvec3 through_haze(const Light& light, const Ray& ray, double distance, glm::dvec3 seen) {
+    if (light.haze_voxels <= 0) {
+        return seen;
+    }
+    const double clear = std::exp(-std::pow(distance / light.haze_voxels, 1.25));
+    const glm::dvec3 flat = glm::normalize(glm::dvec3(ray.direction.x, 0.02, ray.direction.z));
+    return mix_light(sky_light(light, flat), seen, clear);
+}
+
+glm::dvec3 solid_light(SceneReader& reader, const Light& light, const Hit& hit, SkyMemory& memory);
+
+/// A surface that mirrors the sky at flat angles, with the bed shining through where it is shallow.
+glm::dvec3 water_light(SceneReader& reader, const Light& light, const Ray& ray, const Hit& hit,
+                       SkyMemory& memory) {
+    // Share of the light that a voxel of water takes, by colour.
+    constexpr glm::dvec3 kMurk = {0.42, 0.20, 0.15};
+    const double step = reader.tile_at(hit.point.x, hit.point.z).step;
+    const LinearColor color = reader.scene().water_color();
+    const glm::dvec3 deep = glm::dvec3(color.r, color.g, color.b) * 1.35;
+    const double open = hit.cut ? 1 : sun_seen(reader, light, hit, step);
+    const glm::dvec3 body = deep * (kSun * (0.10 + 0.22 * open * light.to_sun.y) + kSky * 0.55);
+    if (hit.cut) {
+        return body;
+    }
+    const double ripple = std::clamp(400 / std::max(1.0, hit.distance), 0.0, 1.0);
+    const auto wave = [&](double period, glm::dvec3 away) {
+        return grain((hit.point + away) / period) - 0.5;
+    };
+    const glm::dvec3 normal = glm::normalize(
+        glm::dvec3(ripple * (0.05 * wave(1.3, {0, 0, 0}) + 0.05 * wave(4.1, {9, 0, 3})), 1,
+                   ripple * (0.05 * wave(1.3, {40, 0, 0}) + 0.05 * wave(4.1, {70, 0, 3}))));
+    const double facing = std::clamp(-glm::dot(ray.direction, normal), 0.0, 1.0);
+    const double mirrored = 0.02 + 0.98 * std::pow(1 - facing, 5.0);
+    glm::dvec3 up = glm::reflect(ray.direction, normal);
+    up.y = std::abs(up.y);
+    glm::dvec3 sky = sky_light(light, up);
+    if (const auto shore =
+            trace(reader, {.origin = hit.point + glm::dvec3(0, 0.05, 0), .direction = up}, 220)) {
+        SkyMemory other;
+        sky = solid_light(reader, light, *shore, other);
+    } else {
+        sky += kSun * open * 6.0 * std::pow(std::max(0.0, glm::dot(up, light.to_sun)), 700.0);
+    }
+    constexpr double kSeenDepth = 14;  // voxels
+    const glm::dvec3 down = glm::normalize(glm::dvec3(
+        ray.direction.x * 0.75, std::min(ray.direction.y, -0.35), ray.direction.z * 0.75));
+    glm::dvec3 seen = body;
+    if (const auto bed =
+            trace(reader, {.origin = hit.point - glm::dvec3(0, 0.02, 0), .direction = down},
+                  kSeenDepth)) {
+        const glm::dvec3 clear = glm::exp(-kMurk * (1.6 * bed->distance + 0.15));
+        seen = body + (solid_light(reader, light, *bed, memory) - body) * clear;
+    }
+    return mix_light(seen, sky, mirrored);
+}
+
+glm::dvec3 solid_light(SceneReader& reader, const Light& light, const Hit& hit, SkyMemory& memory) {
     const double step = reader.tile_at(hit.point.x, hit.point.z).step;
     const LinearColor color = reader.color_near(hit.point);
     const glm::dvec3 albedo =
@@ -129,12 +186,16 @@ glm::dvec3 surface_light(SceneReader& reader, const Light& light, const Ray& ray
     const glm::dvec3 seen = albedo * (kSun * facing * sun_seen(reader, light, hit, step) +
                                       kSky * (0.06 + 0.94 * sky) * (0.35 + 0.65 * upward) +
                                       kGround * (0.3 + 0.7 * sky) * (1 - 0.6 * upward));
-    if (light.haze_voxels <= 0) {
-        return seen;
-    }
-    const double clear = std::exp(-std::pow(hit.distance / light.haze_voxels, 1.25));
-    const glm::dvec3 flat = glm::normalize(glm::dvec3(ray.direction.x, 0.02, ray.direction.z));
-    return mix_light(sky_light(light, flat), seen, clear);
+    return seen;
+}
+
+}  // namespace
+
+glm::dvec3 surface_light(SceneReader& reader, const Light& light, const Ray& ray, const Hit& hit,
+                         SkyMemory& memory) {
+    const glm::dvec3 seen = hit.water ? water_light(reader, light, ray, hit, memory)
+                                      : solid_light(reader, light, hit, memory);
+    return through_haze(light, ray, hit.distance, seen);
 }
 
 LinearColor develop(glm::dvec3 light) {

@@ -71,7 +71,7 @@ void draw_row(Image& image, std::int32_t row, SceneReader& reader, const Camera&
             const Ray ray{.origin = camera.eye,
                           .direction = glm::normalize(camera.forward + camera.right * right +
                                                       camera.down * down)};
-            const auto hit = trace(reader, ray, kSightMax);
+            const auto hit = trace(reader, ray, kSightMax, Sight::solid_and_water);
             const LinearColor one =
                 develop(hit                    ? surface_light(reader, light, ray, *hit, memory)
                         : reader.scene().box() ? backdrop(0.5 + 0.5 * down)

@@ -1,5 +1,7 @@
 #include "server/render/scene.h"
 
+#include "generator/volume/color.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -37,6 +39,11 @@ double begin_of(std::int32_t lod) {
 
 Scene::Scene(const World& world, ColumnPos origin, std::optional<ColumnBlock> block)
     : world_(&world), origin_(origin), height_bound_(world.stack.height_bound + 2) {
+    for (const Material& material : world.definition.materials) {
+        if (material.kind == MaterialKind::water) {
+            water_color_ = linear_from_srgb(material.color);
+        }
+    }
     if (block) {
         box_ = SceneBox{.x0 = static_cast<double>(block->x_first - origin.x) - 0.5,
                         .z0 = static_cast<double>(block->z_first - origin.z) - 0.5,

@@ -66,6 +66,9 @@ class Scene {
 
     double height_bound() const { return height_bound_; }
 
+    /// Of the world's water; black if it has none.
+    LinearColor water_color() const { return water_color_; }
+
   private:
     struct Slot {
         std::once_flag once;
@@ -88,6 +91,7 @@ class Scene {
     ColumnPos origin_;
     std::optional<SceneBox> box_;
     double height_bound_;
+    LinearColor water_color_;
     std::vector<Level> levels_;
 };
 

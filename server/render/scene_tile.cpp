@@ -2,6 +2,7 @@
 
 #include "generator/volume/color.h"
 #include "generator/volume/voxel.h"
+#include "generator/volume/water.h"
 
 #include <algorithm>
 #include <cmath>
@@ -132,6 +133,120 @@ std::array<float, 2> add_caves(SceneTile& tile, std::span<const Limit> limits) {
     return {cover, top};
 }
 
+/// Adds a landscape column's ends and waters, and gives its cover and its top.
+std::array<float, 2> add_ends(SceneTile& tile, std::span<const Limit> limits,
+                              std::span<const Material> materials) {
+    bool is_solid = true;
+    float cover = 0;
+    for (std::size_t i = 0; i < limits.size(); ++i) {
+        const auto y = static_cast<float>(limits[i].y256) / kUnitsPerVoxel;
+        const bool is_last = i + 1 == limits.size();
+        if (!is_last && limits[i + 1].y256 <= limits[i].y256) {
+            continue;
+        }
+        const PaletteEntry& content = tile.set.palette[limits[i].palette_id];
+        const bool is_solid_above = !is_last && content.is_solid();
+        if (is_solid_above != is_solid) {
+            tile.ends.push_back(y);
+            is_solid = is_solid_above;
+        }
+        if (!is_last) {
+            const auto top = static_cast<float>(limits[i + 1].y256) / kUnitsPerVoxel;
+            const bool wet = is_water(content, materials);
+            cover = is_solid_above || wet ? top : cover;
+            if (wet) {
+                tile.waters.push_back({.bed = y, .surface = top});
+            }
+        }
+    }
+    return {cover, tile.ends.empty() ? cover : tile.ends.back()};
+}
+
+std::span<const float> ends_of(const SceneTile& tile, std::size_t column) {
+    return std::span(tile.ends).subspan(tile.end_begin[column],
+                                        tile.end_begin[column + 1] - tile.end_begin[column]);
+}
+
+std::span<const WaterInterval> waters_of(const SceneTile& tile, std::size_t column) {
+    return std::span(tile.waters)
+        .subspan(tile.water_begin[column], tile.water_begin[column + 1] - tile.water_begin[column]);
+}
+
+/// Height above (below 0: depth under) the nearest end, above 0 in the solid.
+double depth_in(std::span<const float> ends, double y) {
+    double distance = 1e9;
+    bool is_solid = true;
+    for (const float end : ends) {
+        distance = std::min(distance, std::abs(y - static_cast<double>(end)));
+        is_solid = static_cast<double>(end) > y ? is_solid : !is_solid;
+    }
+    return ends.empty() ? -distance : is_solid ? distance : -distance;
+}
+
+/// Steeper than so many voxels a column is a wall, and its top no longer matters.
+constexpr double kWallVoxels = 6;
+
+double landscape_density(const SceneTile& tile, const CellWeights& cell, double y) {
+    double density = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        density += cell.weight[i] * std::clamp(depth_in(ends_of(tile, cell.column[i]), y),
+                                               -kWallVoxels, kWallVoxels);
+    }
+    return density;
+}
+
+LinearColor landscape_color(const SceneTile& tile, const CellWeights& cell, double y) {
+    // Below a gentle slope strata follow it; on a wall each column shows what it has at the height.
+    constexpr double kGentle = 4;
+    double highest = -1e9;
+    double lowest = 1e9;
+    for (const std::size_t column : cell.column) {
+        highest = std::max(highest, static_cast<double>(tile.tops[column]));
+        lowest = std::min(lowest, static_cast<double>(tile.tops[column]));
+    }
+    const double depth = mix_of(cell, tile.tops) - y;
+    const bool follows = highest - lowest < kGentle && depth < kGentle;
+    LinearColor color;
+    float total = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t column = cell.column[i];
+        const auto top = static_cast<double>(tile.tops[column]);
+        double at = follows ? top - std::max(0.0, depth) - 0.02 : std::min(y, top - 0.02);
+        auto weight = static_cast<float>(cell.weight[i]) + 1e-6F;
+        LinearColor one = tile.top_colors[column];
+        if (tile.lod == 0) {
+            const auto ends = ends_of(tile, column);
+            const double in = depth_in(ends, at);
+            if (in < 0) {  // out of a hollow, into the rock next to it
+                double nearest = 1e9;
+                double moved = at;
+                for (std::size_t e = 0; e < ends.size(); ++e) {
+                    const auto end = static_cast<double>(ends[e]);
+                    if (std::abs(end - at) < nearest) {
+                        nearest = std::abs(end - at);
+                        moved = end + (e % 2 == 0 ? -0.02 : 0.02);
+                    }
+                }
+                at = moved;
+                weight *= 0.2F;
+            }
+            const std::span<const Limit> limits =
+                std::span(tile.set.columns.limits)
+                    .subspan(
+                        tile.set.columns.offsets[column],
+                        tile.set.columns.offsets[column + 1] - tile.set.columns.offsets[column]);
+            one =
+                color_at(limits, tile.colors,
+                         static_cast<std::int64_t>(std::floor(std::max(0.0, at) * kUnitsPerVoxel)));
+        }
+        color.r += weight * one.r;
+        color.g += weight * one.g;
+        color.b += weight * one.b;
+        total += weight;
+    }
+    return {.r = color.r / total, .g = color.g / total, .b = color.b / total};
+}
+
 void fill_highest(SceneTile& tile) {
     for (std::int32_t v = 0; v < kTileCells; v += kBlockCells) {
         for (std::int32_t u = 0; u < kTileCells; u += kBlockCells) {
@@ -155,6 +270,7 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
     constexpr std::size_t kColumns = std::size_t{kTileCells + 1} * (kTileCells + 1);
     SceneTile tile;
     tile.lod = lod;
+    tile.is_landscape = world.definition.has_landscape();
     tile.covers.assign(kColumns, kNoHeight);
     tile.tops.assign(kColumns, kNoHeight);
     tile.top_colors.assign(kColumns, {});
@@ -166,6 +282,8 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
     if (!made) {
         tile.lod = 1;  // beyond the edge there is no inside either
         tile.block_highest.fill(kNoHeight);
+        tile.end_begin.assign(kColumns + 1, 0);
+        tile.water_begin.assign(kColumns + 1, 0);
         return tile;
     }
     tile.colors = palette_colors(tile.set.palette, world.definition.materials);
@@ -174,7 +292,11 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
             const std::size_t i = SceneTile::index_of(u, v);
             const std::span<const Limit> limits = tile.set.columns.column(u, v);
             tile.cave_begin.push_back(static_cast<std::uint32_t>(tile.caves.size()));
-            const auto [cover, top] = add_caves(tile, limits);
+            tile.end_begin.push_back(static_cast<std::uint32_t>(tile.ends.size()));
+            tile.water_begin.push_back(static_cast<std::uint32_t>(tile.waters.size()));
+            const auto [cover, top] = tile.is_landscape
+                                          ? add_ends(tile, limits, world.definition.materials)
+                                          : add_caves(tile, limits);
             tile.covers[i] = cover;
             tile.tops[i] = top;
             const float under = std::max(0.0F, tile.tops[i] - 0.02F) * kUnitsPerVoxel;
@@ -182,10 +304,14 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
         }
     }
     tile.cave_begin.push_back(static_cast<std::uint32_t>(tile.caves.size()));
+    tile.end_begin.push_back(static_cast<std::uint32_t>(tile.ends.size()));
+    tile.water_begin.push_back(static_cast<std::uint32_t>(tile.waters.size()));
     fill_highest(tile);
     if (lod > 0) {
         tile.set = {};
-        tile.covers = tile.tops;
+        if (!tile.is_landscape) {  // water covers the ground at every level
+            tile.covers = tile.tops;
+        }
         tile.caves = {};
         tile.cave_begin = {};
     }
@@ -198,6 +324,10 @@ double top_at(const SceneTile& tile, TilePoint point) {
 
 double density_at(const SceneTile& tile, TilePoint point) {
     const CellWeights cell = weights_at(point);
+    if (tile.is_landscape) {
+        return tile.lod > 0 ? mix_of(cell, tile.tops) - point.y
+                            : landscape_density(tile, cell, point.y);
+    }
     double density = mix_of(cell, tile.covers) - point.y;
     if (tile.lod > 0) {
         return density;
@@ -210,8 +340,73 @@ double density_at(const SceneTile& tile, TilePoint point) {
     return density;
 }
 
+std::size_t water_surfaces(std::array<WaterSurface, kWaterSurfacesMax>& out, const SceneTile& tile,
+                           std::int32_t u, std::int32_t v) {
+    constexpr float kSame = 1.5F;  // voxels
+    if (tile.waters.empty()) {
+        return 0;
+    }
+    const std::array<std::size_t, 4> columns = {
+        SceneTile::index_of(u, v), SceneTile::index_of(u + 1, v), SceneTile::index_of(u, v + 1),
+        SceneTile::index_of(u + 1, v + 1)};
+    const auto find = [&](std::size_t column, float level) -> const WaterInterval* {
+        for (const WaterInterval& water : waters_of(tile, column)) {
+            if (std::abs(water.surface - level) <= kSame) {
+                return &water;
+            }
+        }
+        return nullptr;
+    };
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        for (const WaterInterval& water : waters_of(tile, columns[i])) {
+            bool is_known = false;
+            for (std::size_t before = 0; before < i; ++before) {
+                is_known = is_known || find(columns[before], water.surface) != nullptr;
+            }
+            if (is_known || count == kWaterSurfacesMax) {
+                continue;
+            }
+            WaterSurface& surface = out[count++];
+            for (std::size_t j = 0; j < 4; ++j) {
+                const WaterInterval* const there = find(columns[j], water.surface);
+                surface.heights[j] = water.surface;
+                if (there != nullptr) {
+                    surface.heights[j] = there->surface;
+                    continue;
+                }
+                // Down to the ground, unless that is higher.
+                const auto ends = ends_of(tile, columns[j]);
+                for (std::size_t e = 0; e < ends.size() && ends[e] <= water.surface; e += 2) {
+                    const bool is_open = e + 1 == ends.size() || ends[e + 1] > water.surface;
+                    surface.heights[j] = is_open ? ends[e] - 0.05F : surface.heights[j];
+                }
+            }
+        }
+    }
+    return count;
+}
+
+bool in_water(const SceneTile& tile, TilePoint point) {
+    if (tile.waters.empty()) {
+        return false;
+    }
+    const auto u = std::clamp(static_cast<std::int32_t>(point.u + 0.5), 0, kTileCells);
+    const auto v = std::clamp(static_cast<std::int32_t>(point.v + 0.5), 0, kTileCells);
+    for (const WaterInterval& water : waters_of(tile, SceneTile::index_of(u, v))) {
+        if (point.y > static_cast<double>(water.bed) &&
+            point.y < static_cast<double>(water.surface)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 LinearColor color_near(const SceneTile& tile, TilePoint point) {
     const CellWeights cell = weights_at(point);
+    if (tile.is_landscape) {
+        return landscape_color(tile, cell, point.y);
+    }
     // Columns are compared at equal depths, so that strata follow the slope they lie under.
     const double depth = mix_of(cell, tile.covers) - point.y;
     LinearColor color;

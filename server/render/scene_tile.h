@@ -29,6 +29,12 @@ struct CaveInterval {
     float lid = 0;
 };
 
+/// Water in one column; heights in voxels.
+struct WaterInterval {
+    float bed = 0;
+    float surface = 0;
+};
+
 /// A point of a tile, in cells from its column (0, 0): 0 <= u, v <= kTileCells. `y` in voxels.
 struct TilePoint {
     double u = 0;
@@ -51,6 +57,13 @@ struct SceneTile {
     std::vector<CaveInterval> caves;
     ColumnSet set;
     std::vector<LinearColor> colors;  ///< of set.palette
+    /// Worlds with a landscape: caves are many and of one kind, so columns are compared by where
+    /// their solid begins and ends, bottom first (the ground's top, then pairs).
+    bool is_landscape = false;
+    std::vector<std::uint32_t> end_begin;
+    std::vector<float> ends;
+    std::vector<std::uint32_t> water_begin;
+    std::vector<WaterInterval> waters;
 
     static constexpr std::size_t index_of(std::int32_t u, std::int32_t v) {
         return static_cast<std::size_t>(v) * (kTileCells + 1) + static_cast<std::size_t>(u);
@@ -64,6 +77,27 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
 
 /// Above 0 inside the solid; the vertical distance to the nearest surface, in voxels.
 double density_at(const SceneTile& tile, TilePoint point);
+
+/// Where one cell's water surfaces lie; a surface slopes down to the ground of columns without it.
+struct WaterSurface {
+    std::array<float, 4> heights{};  ///< of the cell's columns (0, 0), (1, 0), (0, 1), (1, 1)
+
+    double at(double a, double b) const {
+        return (1 - b) * ((1 - a) * static_cast<double>(heights[0]) +
+                          a * static_cast<double>(heights[1])) +
+               b * ((1 - a) * static_cast<double>(heights[2]) +
+                    a * static_cast<double>(heights[3]));
+    }
+};
+
+inline constexpr std::size_t kWaterSurfacesMax = 4;
+
+/// The surfaces over cell (u, v); at most kWaterSurfacesMax are looked at.
+std::size_t water_surfaces(std::array<WaterSurface, kWaterSurfacesMax>& out, const SceneTile& tile,
+                           std::int32_t u, std::int32_t v);
+
+/// Whether the point is in the water of the column next to it.
+bool in_water(const SceneTile& tile, TilePoint point);
 
 /// Height of the highest solid point; `y` is ignored.
 double top_at(const SceneTile& tile, TilePoint point);

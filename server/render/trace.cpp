@@ -94,9 +94,40 @@ double hit_in_cell(const PlacedTile& placed, const Ray& ray, double begin, doubl
     return kNowhere;
 }
 
-/// Goes on from `t` by as much as can be said at once. Gives a hit's distance, or kNowhere with `t`
+/// Where the ray comes down to a water surface within [begin, end] of cell (u, v), or kNowhere.
+double water_in_cell(const PlacedTile& placed, const Ray& ray, std::int32_t u, std::int32_t v,
+                     double begin, double end) {
+    std::array<WaterSurface, kWaterSurfacesMax> surfaces;
+    const std::size_t count = water_surfaces(surfaces, *placed.tile, u, v);
+    double nearest = kNowhere;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto above = [&](double t) {
+            const TilePoint point = placed.local(ray.origin + ray.direction * t);
+            return point.y - surfaces[i].at(point.u - u, point.v - v);
+        };
+        double outside = begin;
+        double inside = end;
+        if (above(outside) <= 0 || above(inside) > 0) {
+            continue;
+        }
+        for (int halving = 0; halving < 14; ++halving) {
+            const double middle = 0.5 * (outside + inside);
+            (above(middle) > 0 ? outside : inside) = middle;
+        }
+        nearest = std::min(nearest, inside);
+    }
+    return nearest;
+}
+
+/// A hit's distance, or kNowhere.
+struct Found {
+    double distance = kNowhere;
+    bool water = false;
+};
+
+/// Goes on from `t` by as much as can be said at once. Gives what is hit, or nothing with `t`
 /// moved.
-double advance(SceneReader& reader, const Ray& ray, double& t, double end) {
+Found advance(SceneReader& reader, const Ray& ray, double& t, double end, Sight sight) {
     const glm::dvec3 at = ray.origin + ray.direction * (t + kNudge);
     const PlacedTile& placed = reader.tile_at(at.x, at.z);
     const double side = placed.step * kTileCells;
@@ -104,7 +135,7 @@ double advance(SceneReader& reader, const Ray& ray, double& t, double end) {
     if (placed.tile == nullptr ||
         lowest(ray, t, exit) > static_cast<double>(placed.tile->highest)) {
         t = std::max(exit, t) + kNudge;
-        return kNowhere;
+        return {};
     }
     const auto cell_u =
         std::clamp(static_cast<std::int32_t>((at.x - placed.x0) / placed.step), 0, kTileCells - 1);
@@ -119,7 +150,7 @@ double advance(SceneReader& reader, const Ray& ray, double& t, double end) {
         static_cast<double>(placed.tile->block_highest[static_cast<std::size_t>(
             block_v * kBlocksPerSide + block_u)])) {
         t = std::max(exit, t) + kNudge;
-        return kNowhere;
+        return {};
     }
     exit = std::min(end, exit_of(ray, placed.x0 + placed.step * cell_u,
                                  placed.z0 + placed.step * cell_v, placed.step));
@@ -135,9 +166,14 @@ double advance(SceneReader& reader, const Ray& ray, double& t, double end) {
     }
     t = std::max(exit, t) + kNudge;
     if (begin > exit || lowest(ray, begin, exit) > highest) {
-        return kNowhere;
+        return {};
     }
-    return hit_in_cell(placed, ray, begin, exit);
+    const double solid = hit_in_cell(placed, ray, begin, exit);
+    if (sight == Sight::solid) {
+        return {.distance = solid};
+    }
+    const double water = water_in_cell(placed, ray, cell_u, cell_v, begin, exit);
+    return water < solid ? Found{.distance = water, .water = true} : Found{.distance = solid};
 }
 
 /// Over one cell either way, so that it is as smooth as the surface looks.
@@ -154,23 +190,41 @@ glm::dvec3 normal_at(SceneReader& reader, glm::dvec3 point) {
 
 }  // namespace
 
-std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max) {
+std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max, Sight sight) {
     const RaySpan span = span_of(reader.scene(), ray, distance_max);
     if (span.begin >= span.end) {
         return std::nullopt;
     }
+    if (sight == Sight::solid_and_water && (span.entered.x != 0 || span.entered.z != 0)) {
+        const glm::dvec3 side = ray.origin + ray.direction * (span.begin + 2 * kNudge);
+        const PlacedTile& placed = reader.tile_at(side.x, side.z);
+        if (placed.tile != nullptr && in_water(*placed.tile, placed.local(side)) &&
+            reader.density_at(side) <= 0) {
+            return Hit{.distance = span.begin,
+                       .point = side,
+                       .normal = span.entered,
+                       .cut = true,
+                       .water = true};
+        }
+    }
     double t = span.begin;
     for (int step = 0; step < kStepsMax && t < span.end; ++step) {
-        const double found = advance(reader, ray, t, span.end);
-        if (found == kNowhere) {
+        const Found found = advance(reader, ray, t, span.end, sight);
+        if (found.distance == kNowhere) {
             if (ray.direction.y >= 0 &&
                 ray.origin.y + ray.direction.y * t > reader.scene().height_bound()) {
                 break;
             }
             continue;
         }
-        Hit hit{.distance = found, .point = ray.origin + ray.direction * found};
-        hit.cut = reader.scene().box() && found <= span.begin + 2 * kNudge &&
+        Hit hit{.distance = found.distance,
+                .point = ray.origin + ray.direction * found.distance,
+                .water = found.water};
+        if (hit.water) {
+            hit.normal = {0, 1, 0};
+            return hit;
+        }
+        hit.cut = reader.scene().box() && found.distance <= span.begin + 2 * kNudge &&
                   (span.entered.x != 0 || span.entered.y < 0 || span.entered.z != 0);
         hit.normal = hit.cut ? span.entered : normal_at(reader, hit.point);
         return hit;

@@ -9,6 +9,7 @@
 
 #include <glm/glm.hpp>
 
+#include <cstdint>
 #include <optional>
 
 namespace terrane {
@@ -23,9 +24,16 @@ struct Hit {
     glm::dvec3 point{};
     glm::dvec3 normal{};  ///< of length 1
     bool cut = false;     ///< on a side of the block
+    bool water =
+        false;  ///< the surface of water, seen from above, or the side of it where it is cut
 };
 
-/// The first solid point within `distance_max` voxels. Rays that begin inside the solid hit at 0.
-std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max);
+/// What rays stop at.
+enum class Sight : std::uint8_t { solid, solid_and_water };
+
+/// The first solid point within `distance_max` voxels, or point of a water surface. Rays that begin
+/// inside the solid hit at 0.
+std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max,
+                         Sight sight = Sight::solid);
 
 }  // namespace terrane

@@ -101,8 +101,7 @@ Result<std::vector<std::uint16_t>> main_materials(const World& world,
                 const auto shares = voxels[y].shares();
                 const auto most = std::ranges::max_element(shares, {}, &Share::concentration);
                 const auto& material = world.definition.materials[most->material];
-                const bool empty =
-                    material.kind == MaterialKind::void_ || material.kind == MaterialKind::cave;
+                const bool empty = !is_solid(material.kind);
                 out[(static_cast<std::size_t>(z) * layers + y) * width +
                     static_cast<std::size_t>(x)] =
                     empty ? std::uint16_t{0} : static_cast<std::uint16_t>(most->material + 1);

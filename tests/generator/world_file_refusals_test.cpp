@@ -32,8 +32,9 @@ TEST_P(WorldFileRefuses, WithPlaceAndReason) {
 }
 
 const Refusal kRefusals[] = {
-    {"FormatUnknown", 1, "format = 2", "w.toml:1:10: format: is 2; it must be 1"},
-    {"FormatMissing", 1, "", "w.toml:1:1: format: is missing; it must be 1"},
+    {"FormatUnknown", 1, "format = 3",
+     "w.toml:1:10: format: is 3; it must be an integer from 1 to 2"},
+    {"FormatMissing", 1, "", "w.toml:1:1: format: is missing; it must be an integer from 1 to 2"},
     {"NameMissing", 2, "",
      "w.toml:1:1: name: is missing; it must be a string of 1 to 128 bytes without control "
      "characters"},
@@ -101,8 +102,8 @@ const Refusal kRefusals[] = {
     {"NoRegular", 39, "kind = \"base\"",
      "w.toml:21:1: material: no material is of kind \"regular\"; at least one is needed"},
     {"UnknownKind", 39, "kind = \"regualr\"",
-     "w.toml:39:8: material.kind: is \"regualr\"; it must be void, base, regular, vein or cave; "
-     "the nearest is \"regular\""},
+     "w.toml:39:8: material.kind: is \"regualr\"; it must be void, base, regular, vein or cave, "
+     "in format 2 also soil, sand, snow or water; the nearest is \"regular\""},
     {"ColorNotHexadecimal", 38, "color = \"#c4a47g\"",
      "w.toml:38:9: material.color: is \"#c4a47g\"; it must be \"#rrggbb\", two hexadecimal digits "
      "a channel"},

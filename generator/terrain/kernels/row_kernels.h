@@ -14,8 +14,9 @@ namespace terrane {
 
 /// Kernels work in blocks of this many columns and may write so many values past a row's end.
 inline constexpr std::int32_t kVectorPad = 16;
-/// Widest rectangle: a 64-column stack and its aprons, and the paper's 50-column plots, fit.
-inline constexpr std::int32_t kRectangleSideMax = 128;
+/// Widest rectangle: a 64-column stack, the paper's 50-column plots and pictures' tiles fit, with
+/// the wider aprons of landscapes.
+inline constexpr std::int32_t kRectangleSideMax = 144;
 
 constexpr std::int32_t padded_width(std::int32_t width) {
     return (width + kVectorPad - 1) / kVectorPad * kVectorPad;

@@ -1,0 +1,133 @@
+// Cave systems: nodes in the soluble layers, joined by tubes.
+//
+// After Paris, Guerin, Peytavie, Collon, Galin, "Synthesizing geologically coherent cave networks",
+// 2021: caves begin on inception horizons, so they follow layers and their folds. There, paths are
+// searched over the whole rock; here every node knows its neighbours, so that any place can be
+// asked for.
+//
+// Horizons: the stack from kLowest to kHighest of its depth is cut into `levels` bands; in each,
+// the layer with the greatest soluble * thickness, if that is over kSolubleLeast. A cell of `cell`
+// columns has a node on each horizon with chance `density`. Tubes run to the next nodes along +x
+// and +z with chance `connect`, along the diagonal with 0.3 of it, up to the next horizon with
+// `shaft`; a node of the highest horizon opens to the sky with `sink`, a doline.
+//
+// A tube is kTubePoints points along a bent line. At a column each piece is a capsule: with q the
+// distance^2 on the map, r the radius made uneven by noise, hh = sqrt(r^2 - q) and m the slope of
+// the piece, the cave reaches hh * sqrt(1 + m^2) up from the axis but not beyond the piece's ends
+// and hh, and kFlatFloor of it down, so that one can walk.
+#pragma once
+
+#include "generator/landscape/fold.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/terrain/noise.h"
+#include "generator/world/world_definition.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace terrane {
+
+inline constexpr std::size_t kTubePoints = 7;
+inline constexpr std::size_t kCavesPerColumnMax = 10;  ///< of further ones the last are left out
+
+/// A layer in which caves form.
+struct CaveHorizon {
+    float bottom = 0;  ///< voxels
+    float thickness = 0;
+    float soluble = 0;
+};
+
+struct CaveConstants {
+    std::int64_t cell = 0;  ///< columns; 0: no caves
+    CaveParameters parameters;
+    std::vector<CaveHorizon> horizons;  ///< bottom first
+    std::uint64_t seed = 0;
+    Noise rough;   ///< of walls
+    Noise ragged;  ///< likewise, wider
+
+    CaveConstants(const WorldDefinition& definition, const LayerStack& stack);
+};
+
+struct TubePoint {
+    float x = 0;  ///< columns from the tube's origin
+    float z = 0;
+    float y = 0;  ///< voxels
+    float radius = 0;
+};
+
+struct Tube {
+    std::int64_t x = 0;  ///< origin: its first node
+    std::int64_t z = 0;
+    std::array<TubePoint, kTubePoints> points{};
+    float x_min = 0;  ///< its box, radii included
+    float x_max = 0;
+    float z_min = 0;
+    float z_max = 0;
+};
+
+/// A shaft to the sky and the funnel around its mouth.
+struct Doline {
+    std::int64_t x = 0;
+    std::int64_t z = 0;
+    float y = 0;  ///< of the node it leads to
+    float radius = 0;
+};
+
+/// Everything that can be met in a rectangle of columns, cells ascending. Kept from region to
+/// region: neighbours ask for the same cells.
+class CaveGraph {
+  public:
+    void build(const CaveConstants& constants, const FoldConstants& folds,
+               const RectangleShape& shape);
+
+    const std::vector<Tube>& tubes() const { return tubes_; }
+
+    const std::vector<Doline>& dolines() const { return dolines_; }
+
+  private:
+    bool is_built_ = false;
+    std::array<std::int64_t, 4> range_{};
+    std::vector<Tube> tubes_;
+    std::vector<Doline> dolines_;
+};
+
+/// Voxels from floor to lid in one column.
+struct CaveGap {
+    float floor = 0;
+    float lid = 0;
+};
+
+/// The gaps of a rectangle's columns.
+class CaveField {
+  public:
+    /// `ground` has the height of the ground for each column: funnels are cut there, by
+    /// `cut_funnels`, before.
+    void build(const CaveConstants& constants, const CaveGraph& graph, const RectangleShape& shape,
+               const RowKernels& kernels, NoiseBuffers& buffers);
+
+    std::span<const CaveGap> gaps(std::size_t i) const {
+        if (counts_.empty()) {
+            return {};
+        }
+        return {pool_.data() + std::size_t{places_[i]} * kCavesPerColumnMax, counts_[i]};
+    }
+
+  private:
+    void add(std::size_t i, CaveGap gap);
+
+    std::vector<std::uint8_t> counts_;
+    std::vector<std::uint32_t> places_;
+    std::vector<CaveGap> pool_;
+    std::uint32_t pool_used_ = 0;
+    std::vector<float> rough_;
+    std::vector<float> ragged_;
+};
+
+/// Lowers the ground around the mouths of dolines; `allowed` is 0 where water would run in and 1
+/// where nothing speaks against it.
+void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
+                 const RectangleShape& shape);
+
+}  // namespace terrane

@@ -1,0 +1,169 @@
+#include "generator/landscape/channels.h"
+
+#include "generator/landscape/numbers.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace terrane {
+namespace {
+
+constexpr float kBank = 1.5F;        ///< half widths: banks reach so far
+constexpr float kWet = 1.3F;         ///< half widths
+constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its river
+constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
+constexpr float kFar = 1e9F;
+
+/// A column and a reach.
+struct Near {
+    float distance = 0;
+    float half_width = 0;
+    float level = 0;
+};
+
+float half_width_of(const ChannelConstants& constants, const Reach& reach, float along) {
+    const float width = 0.15F + constants.rivers * (reach.measure + reach.measure_change * along);
+    return reach.is_sink ? kLakeWidths * width + 2.0F : width;
+}
+
+bool is_wet(const ChannelConstants& constants, const Reach& reach) {
+    if (reach.is_sink && (reach.measure <= 0 || reach.level < constants.sea)) {
+        return false;
+    }
+    return std::max(half_width_of(constants, reach, 0), half_width_of(constants, reach, 1)) >=
+           kDryWidth;
+}
+
+float out_of(float half_width) {
+    return 5.0F * half_width + 2.0F;
+}
+
+/// Where the columns of a region look for their river, from the smallest to the greatest.
+struct Looked {
+    float x_min = kFar;
+    float x_max = -kFar;
+    float z_min = kFar;
+    float z_max = -kFar;
+};
+
+Looked looked_at(const ReliefRasters& relief, const RectangleShape& shape) {
+    Looked looked;
+    for (std::int32_t row = 0; row < shape.length; ++row) {
+        for (std::int32_t column = 0; column < shape.width; ++column) {
+            const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+            const float x = static_cast<float>(column * shape.step) + relief.wander_x[i];
+            const float z = static_cast<float>(row * shape.step) + relief.wander_z[i];
+            looked = {.x_min = std::min(looked.x_min, x),
+                      .x_max = std::max(looked.x_max, x),
+                      .z_min = std::min(looked.z_min, z),
+                      .z_max = std::max(looked.z_max, z)};
+        }
+    }
+    return looked;
+}
+
+bool meets(const Looked& looked, const Reach& reach, float x0, float z0, float out) {
+    const float most = out + 1.0F;  // a column of slack for float rounding
+    return looked.x_max - x0 >= reach.x_min - most && looked.x_min - x0 <= reach.x_max + most &&
+           looked.z_max - z0 >= reach.z_min - most && looked.z_min - z0 <= reach.z_max + most;
+}
+
+/// Calls `use(i, near)` for each column within `out` of each wet reach, reach by reach.
+template <typename Use>
+void for_each_near(const ChannelConstants& constants, const ReliefRasters& relief,
+                   const RiverGraph& rivers, const RectangleShape& shape, Use use) {
+    const Looked looked = looked_at(relief, shape);
+    for (const Reach& reach : rivers.reaches()) {
+        if (!is_wet(constants, reach)) {
+            continue;
+        }
+        const float out = out_of(
+            std::max(half_width_of(constants, reach, 0), half_width_of(constants, reach, 1)));
+        const auto x0 = static_cast<float>(reach.x - shape.x0);
+        const auto z0 = static_cast<float>(reach.z - shape.z0);
+        if (!meets(looked, reach, x0, z0, out)) {
+            continue;
+        }
+        for (std::int32_t row = 0; row < shape.length; ++row) {
+            for (std::int32_t column = 0; column < shape.width; ++column) {
+                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+                // From the reach, not from the region: the same bits for every region.
+                const float x = static_cast<float>(shape.x0 + column * shape.step - reach.x) +
+                                relief.wander_x[i];
+                const float z =
+                    static_cast<float>(shape.z0 + row * shape.step - reach.z) + relief.wander_z[i];
+                if (x < reach.x_min - out || x > reach.x_max + out || z < reach.z_min - out ||
+                    z > reach.z_max + out) {
+                    continue;
+                }
+                const OnReach nearest = nearest_on(reach, x, z);
+                const float half_width = half_width_of(constants, reach, nearest.along);
+                const float reach_out = out_of(half_width);
+                if (half_width < kDryWidth || nearest.square >= reach_out * reach_out) {
+                    continue;
+                }
+                use(i, Near{.distance = std::sqrt(nearest.square),
+                            .half_width = half_width,
+                            .level = reach.level + reach.level_change * nearest.along});
+            }
+        }
+    }
+}
+
+float channel_height(const Near& near, float ground) {
+    const float d = near.distance;
+    const float w = near.half_width;
+    if (d < w) {
+        return near.level - 1.0F - std::min(0.8F + 0.5F * w, w) * (1.0F - d * d / (w * w));
+    }
+    return near.level - 1.0F +
+           (ground - near.level + 1.0F) * smooth_step(0, 1, (d - w) / (out_of(w) - w));
+}
+
+}  // namespace
+
+ChannelConstants::ChannelConstants(const WorldDefinition& definition)
+    : rivers(static_cast<float>(definition.relief.rivers)) {
+    if (definition.relief.sea_level) {
+        sea = static_cast<float>(*definition.relief.sea_level);
+    }
+}
+
+void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,
+                  const ReliefRasters& relief, const RiverGraph& rivers,
+                  const RectangleShape& shape) {
+    const std::size_t size = shape.padded_size();
+    out.water.assign(size, kNoWater);
+    out.nearness.assign(size, kFar);
+    out.near_count.assign(size, 0);
+    out.weight.assign(size, 0);
+    if (relief.has_rivers && constants.rivers > 0) {
+        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+            const float nearness = near.distance / near.half_width;
+            out.nearness[i] = std::min(out.nearness[i], nearness);
+            out.near_count[i] += nearness < kBank ? 1.0F : 0.0F;
+            if (nearness < kWet) {
+                // Where rivers meet, a mean that passes from one level to the other without a step.
+                const float weight = kWet - nearness;
+                out.water[i] =
+                    (out.weight[i] > 0 ? out.water[i] : 0.0F) + weight * (near.level - kFreeboard);
+                out.weight[i] += weight;
+            }
+        });
+        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+            const float height = channel_height(near, ground[i]);
+            const bool is_bank =
+                near.distance < kBank * near.half_width && out.near_count[i] <= 1.0F;
+            if (height < ground[i] || is_bank) {
+                ground[i] = height;
+            }
+        });
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+        const float river = out.weight[i] > 0 ? out.water[i] / out.weight[i] : kNoWater;
+        const float water = std::max(river, constants.sea);
+        out.water[i] = water > ground[i] ? water : kNoWater;
+    }
+}
+
+}  // namespace terrane

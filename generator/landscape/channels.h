@@ -1,0 +1,44 @@
+// Channels: the rivers' beds, banks and water, cut at full resolution.
+//
+//     w = .15 + rivers * measure (half the width), d the distance, h the level, out = 5 w + 2
+//     d < w:  h - 1 - min(.8 + .5 w, w) (1 - d^2/w^2)            the bed
+//     else:   h - 1 + (ground - h + 1) step(0, 1, (d - w)/(out - w))
+//     taken if lower; or, within 1.5 w where no other channel is as near, also if higher: a bank
+//     water up to h - 1.4 where d < 1.3 w
+//
+// Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake.
+#pragma once
+
+#include "generator/landscape/relief.h"
+#include "generator/landscape/river_graph.h"
+#include "generator/terrain/noise.h"
+#include "generator/world/world_definition.h"
+
+#include <vector>
+
+namespace terrane {
+
+inline constexpr float kDryWidth = 0.4F;  ///< half the width, columns
+inline constexpr float kNoWater = -1e9F;  ///< stands for a water level where there is none
+
+struct ChannelConstants {
+    float rivers = 0;
+    float sea = kNoWater;
+
+    explicit ChannelConstants(const WorldDefinition& definition);
+};
+
+/// Per column of a shape.
+struct ChannelRasters {
+    std::vector<float> water;       ///< level, or kNoWater
+    std::vector<float> nearness;    ///< distance to the nearest channel's middle in its half widths
+    std::vector<float> near_count;  ///< channels nearer than 1.5 of their half widths
+    std::vector<float> weight;      ///< of the levels that `water` is made of
+};
+
+/// Cuts the channels into `ground` and says where water stands; the sea is part of it.
+void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,
+                  const ReliefRasters& relief, const RiverGraph& rivers,
+                  const RectangleShape& shape);
+
+}  // namespace terrane

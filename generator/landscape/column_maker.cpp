@@ -1,0 +1,312 @@
+#include "generator/landscape/column_maker.h"
+
+#include "generator/landscape/numbers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace terrane {
+namespace {
+
+constexpr float kRoofUnderWater = 5;    ///< voxels of rock left between a cave and open water
+constexpr float kRoofLeast = 1.6F;      ///< voxels: a thinner roof falls in
+constexpr float kWallLeast = 1.5F;      ///< voxels: nearer caves become one
+constexpr float kCaveLeast = 0.8F;      ///< voxels
+constexpr float kCaveDeepest = 2;       ///< voxels above the bottom of the world
+constexpr float kSteepestSoil = 0.42F;  ///< slope^2 on which no soil lies
+constexpr float kSteepestSnow = 1.1F;
+constexpr float kSnow = 2.2F;         ///< voxels
+constexpr float kSnowLineNoise = 22;  ///< voxels
+constexpr float kLeastCover = 0.25F;  ///< voxels
+constexpr float kSandWidths = 2.2F;   ///< half widths of a river
+constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
+
+std::int32_t to_256(float voxels) {
+    return static_cast<std::int32_t>(std::floor(voxels * 256.0F + 0.5F));
+}
+
+}  // namespace
+
+/// Where a column's values lie.
+struct ColumnMaker::Place {
+    std::size_t at = 0;        ///< in the region's rasters
+    std::size_t field_at = 0;  ///< in the field's
+    std::int32_t column = 0;   ///< of the region's shape
+    std::int32_t row = 0;
+    float ground = 0;
+    float water = kNoWater;
+    std::int32_t top256 = 0;
+    const std::int32_t* flow = nullptr;  ///< null: none
+    std::ptrdiff_t flow_plane = 0;
+
+    std::int32_t flow_of(std::size_t layer) const {
+        return flow == nullptr ? 0 : flow[static_cast<std::ptrdiff_t>(layer) * flow_plane];
+    }
+};
+
+void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t moved256,
+                             std::int32_t block_top) const {
+    const std::size_t plane = sources_.region.plane_size();
+    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
+    const std::size_t layers = sources_.rules.size();
+    std::int32_t bottom = out.top();
+    const std::int32_t block_bottom = bottom;
+    LimitTail below = 0;
+    bool below_alone = true;
+    for (std::size_t k = 0; k < layers && bottom < block_top; ++k, y256 += plane) {
+        const std::int32_t top = *y256 + moved256;
+        if (top <= bottom) {
+            continue;
+        }
+        const LayerRules& rule = sources_.rules[k];
+        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), place.flow_of(k));
+        const bool blends = bottom > block_bottom && !below_alone && !rule.alone && rule.blend > 0;
+        const std::int32_t blend =
+            blends ? std::max(1, ((top - bottom) * rule.blend + 128) >> 8) : 0;
+        const std::int32_t end = std::min(top, block_top);
+        out.push({.bottom = bottom,
+                  .top = end,
+                  .middle = std::min(bottom + blend, end),
+                  .tail = tail,
+                  .from = below});
+        bottom = end;
+        below = tail;
+        below_alone = rule.alone;
+    }
+    if (bottom < block_top) {  // the stack ends below the ground
+        const std::uint16_t soil = sources_.constants.palette.soil;
+        const auto last = static_cast<std::uint16_t>(layers - 1);
+        out.push({.bottom = bottom,
+                  .top = block_top,
+                  .middle = bottom,
+                  .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
+                                  place.flow_of(layers - 1)),
+                  .from = 0});
+    }
+}
+
+void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t moved256,
+                             std::int32_t block_bottom) const {
+    const Region& region = sources_.region;
+    std::uint64_t gaps = region.gap_mask[place.at];
+    for (std::size_t gap = 0; gaps != 0; ++gap, gaps >>= 1U) {
+        if ((gaps & 1U) == 0) {
+            continue;
+        }
+        const std::int32_t base = region.y256[gap * region.plane_size() + place.at] + moved256;
+        const std::size_t end =
+            gap + 1 < sources_.rules.size() ? region.gap_begin[gap + 1] : region.elements.size();
+        for (std::size_t e = region.gap_begin[gap]; e < end; ++e) {
+            const PlacedElement& element = region.elements[e];
+            const std::int32_t x = place.column - element.column_first;
+            const std::int32_t z = place.row - element.row_first;
+            if (x < 0 || z < 0 || x >= element.columns || z >= element.rows) {
+                continue;
+            }
+            const float thickness =
+                region.thickness[element.raster + static_cast<std::size_t>(z * element.stride + x)];
+            if (thickness > 0) {
+                const bool is_cave = element.element().type == ElementType::cave;
+                out.replace(
+                    std::max(base, block_bottom), base + to_256(thickness),
+                    tail_of(static_cast<std::uint16_t>(sources_.world.base_palette.size() + e),
+                            is_cave ? 0 : place.flow_of(gap)));
+            }
+        }
+    }
+}
+
+void ColumnMaker::add_blocks(ColumnRuns& out, const Place& place) const {
+    const auto planes = sources_.fractures.planes(place.field_at);
+    const float fold = sources_.folds[place.field_at];
+    std::array<float, kPlanesPerColumnMax + 1> tops{};
+    std::size_t blocks = 0;
+    for (const PlaneInColumn& plane : planes) {
+        if (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground) {
+            std::size_t place_of = blocks++;
+            for (; place_of > 0 && tops[place_of - 1] > plane.y; --place_of) {
+                tops[place_of] = tops[place_of - 1];
+            }
+            tops[place_of] = plane.y;
+        }
+    }
+    tops[blocks++] = place.ground;
+    float bottom = 0;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        // A plane at the block's bottom lies below it.
+        float moved = fold;
+        for (const PlaneInColumn& plane : planes) {
+            moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
+        }
+        const std::int32_t block_bottom = out.top();
+        const std::int32_t block_top =
+            b + 1 == blocks ? place.top256 : std::min(to_256(tops[b]), place.top256);
+        if (block_top > block_bottom) {
+            add_layers(out, place, to_256(moved), block_top);
+            add_lenses(out, place, to_256(moved), block_bottom);
+        }
+        bottom = tops[b];
+    }
+}
+
+void ColumnMaker::add_sheets(ColumnRuns& out, const Place& place) const {
+    const auto& fillings = sources_.constants.palette.fillings;
+    if (fillings.empty()) {
+        return;
+    }
+    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
+        if (plane.half_sheet <= 0) {
+            continue;
+        }
+        const std::int32_t low = to_256(plane.y - plane.half_sheet);
+        const std::int32_t high = to_256(plane.y + plane.half_sheet);
+        if (low >= place.top256 || high <= 0) {
+            continue;
+        }
+        const auto& filling = fillings[plane.filling % fillings.size()];
+        const std::int32_t flow = place.flow_of(0);
+        const std::int32_t rich_from = to_256(place.ground - kEnrichedDepth);
+        out.replace(low, std::min(high, rich_from), tail_of(filling.primary, flow));
+        out.replace(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
+    }
+}
+
+void ColumnMaker::add_cover(ColumnRuns& out, const Place& place) const {
+    const LandscapeConstants& constants = sources_.constants;
+    const auto stride = static_cast<std::size_t>(sources_.region.shape.stride());
+    const float per_column = 0.5F / static_cast<float>(sources_.region.shape.step);
+    const float* const ground = sources_.ground.data() + place.at;
+    const float slope_x = (ground[1] - ground[-1]) * per_column;
+    const float slope_z = (ground[stride] - *(ground - stride)) * per_column;
+    const float square = slope_x * slope_x + slope_z * slope_z;
+    const float noise = sources_.soil[place.at];
+    const LimitTail below = out.last().tail;
+    const auto lay = [&](std::uint16_t id, float thickness) {
+        if (id != LandscapePalette::kNoEntry && thickness >= kLeastCover) {
+            const LimitTail tail = (below & ~LimitTail{0xffff}) | id;
+            out.replace(place.top256 - to_256(thickness), place.top256, tail);
+        }
+    };
+    const float soil = constants.soil * (1.0F - square / kSteepestSoil) *
+                       (0.6F + 0.4F * clamp01(1.0F - sources_.crest[place.at])) *
+                       (1.0F + 0.6F * noise);
+    const bool by_river = sources_.channels.nearness[place.at] < kSandWidths;
+    const bool by_sea = place.ground < constants.sea + kBeach;
+    if ((by_river || by_sea) && square < kSteepestSnow) {
+        lay(constants.palette.sand, std::max(1.2F, soil));
+    } else {
+        lay(constants.palette.soil, soil);
+    }
+    if (constants.has_snow && place.water == kNoWater) {
+        const float above =
+            (place.ground - constants.snow_line + kSnowLineNoise * noise) * (1.0F / 12.0F);
+        lay(constants.palette.snow, kSnow * clamp01(above) * (1.0F - square / kSteepestSnow));
+    }
+}
+
+void ColumnMaker::add_caves(ColumnRuns& out, const Place& place) const {
+    const auto found = sources_.caves.gaps(place.at);
+    if (found.empty()) {
+        return;
+    }
+    std::array<CaveGap, kCavesPerColumnMax> gaps;
+    std::size_t count = 0;
+    const bool keeps_roof =
+        place.water > kNoWater || sources_.channels.nearness[place.at] < kSandWidths;
+    for (CaveGap gap : found) {
+        gap.floor = std::max(gap.floor, kCaveDeepest);
+        if (keeps_roof) {
+            gap.lid = std::min(gap.lid, sources_.ground[place.at] - kRoofUnderWater);
+        } else if (gap.lid > place.ground - kRoofLeast) {
+            gap.lid = place.ground;
+        }
+        if (gap.lid - gap.floor >= kCaveLeast) {
+            gaps[count++] = gap;
+        }
+    }
+    std::sort(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const CaveGap& a, const CaveGap& b) {
+                  return a.floor != b.floor ? a.floor < b.floor : a.lid < b.lid;
+              });
+    const LandscapeConstants& constants = sources_.constants;
+    const float flooded =
+        constants.has_relief
+            ? std::max(sources_.river[place.at] - constants.water_table, constants.sea)
+            : constants.sea;
+    for (std::size_t i = 0; i < count;) {
+        CaveGap gap = gaps[i++];
+        while (i < count && gaps[i].floor - gap.lid < kWallLeast) {
+            gap.lid = std::max(gap.lid, gaps[i++].lid);
+        }
+        const std::int32_t floor = to_256(gap.floor);
+        const std::int32_t lid = gap.lid >= place.ground ? place.top256 : to_256(gap.lid);
+        out.replace(floor, lid, tail_of(constants.palette.cave_air, 0));
+        if (constants.palette.water != LandscapePalette::kNoEntry && flooded > gap.floor) {
+            out.replace(floor, std::min(lid, to_256(flooded)), tail_of(constants.palette.water, 0));
+        }
+    }
+    // What is open to the sky is no cave.
+    if (palette_id_of(out.last().tail) == constants.palette.cave_air) {
+        out.cut(out.last().bottom);
+    }
+}
+
+void ColumnMaker::add_overhang(ColumnRuns& out, const Place& place) const {
+    const Overhang* const overhang = sources_.overhangs.at(place.at);
+    if (overhang == nullptr || place.water > kNoWater) {
+        return;
+    }
+    const auto layer = static_cast<std::uint16_t>(overhang->layer);
+    const LimitTail rock = tail_of(layer, place.flow_of(static_cast<std::size_t>(overhang->layer)));
+    const std::int32_t ground = out.top();
+    const std::int32_t top = to_256(overhang->top);
+    const bool is_filled = overhang->bottom <= place.ground;
+    const std::int32_t bottom = is_filled ? ground : to_256(overhang->bottom);
+    if (top <= ground || bottom < ground) {
+        return;
+    }
+    out.push({.bottom = ground,
+              .top = bottom,
+              .middle = ground,
+              .tail = tail_of(sources_.constants.palette.open_air, 0),
+              .from = 0});
+    out.push({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+}
+
+void ColumnMaker::make(ColumnRuns& out, std::int32_t x, std::int32_t z, bool has_flow) const {
+    const Region& region = sources_.region;
+    Place place;
+    place.column = x + 2;  // the shape has an apron of two columns
+    place.row = z + 2;
+    place.at = static_cast<std::size_t>(place.row * region.shape.stride() + place.column);
+    place.field_at = static_cast<std::size_t>(
+        (place.row + sources_.margin) * sources_.field.stride() + place.column + sources_.margin);
+    place.ground = sources_.banks[place.at];
+    place.water = sources_.channels.water[place.at];
+    place.top256 = std::max(to_256(place.ground), 2 * kUnitsPerVoxel);
+    if (has_flow) {
+        place.flow =
+            region.flow.data() + static_cast<std::ptrdiff_t>(z + 1) * region.flow_stride + (x + 1);
+        place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
+    }
+    out.clear();
+    add_blocks(out, place);
+    add_sheets(out, place);
+    if (sources_.constants.has_relief) {
+        add_cover(out, place);
+    }
+    add_caves(out, place);
+    const std::uint16_t water = sources_.constants.palette.water;
+    if (place.water > kNoWater && water != LandscapePalette::kNoEntry) {
+        const std::int32_t bed = out.top();
+        out.push({.bottom = bed,
+                  .top = to_256(place.water),
+                  .middle = bed,
+                  .tail = tail_of(water, 0),
+                  .from = 0});
+    }
+    add_overhang(out, place);
+}
+
+}  // namespace terrane

@@ -1,0 +1,96 @@
+// The landscape of a world: the stack of layers bent, cut and pierced, as limits.
+//
+// Order of work for a rectangle of columns: version 1's region (heights, lenses and flow of the
+// stack); folds and fractures; rivers and relief; the erosion filter; the resistance map; dolines,
+// channels and the sea; caves; and then column by column from the bottom to the top. Each step is a
+// file of this folder and a function of (world, column): regions of any size give the same bytes.
+#pragma once
+
+#include "generator/landscape/caves.h"
+#include "generator/landscape/channels.h"
+#include "generator/landscape/column_runs.h"
+#include "generator/landscape/erosion.h"
+#include "generator/landscape/fold.h"
+#include "generator/landscape/fractures.h"
+#include "generator/landscape/landscape_palette.h"
+#include "generator/landscape/overhangs.h"
+#include "generator/landscape/relief.h"
+#include "generator/landscape/resistance.h"
+#include "generator/terrain/column_writer.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+/// Everything a landscape draws from its world once; made once per generator.
+struct LandscapeConstants {
+    FoldConstants folds;
+    FractureConstants fractures;
+    ReliefConstants relief;
+    ErosionConstants erosion;
+    ResistanceConstants resistance;
+    OverhangConstants overhangs;
+    ChannelConstants channels;
+    CaveConstants caves;
+    LandscapePalette palette;
+    bool has_relief = false;
+    float snow_line = 0;
+    bool has_snow = false;
+    float soil = 0;
+    float sea = 0;
+    float water_table = 0;
+    Noise soil_noise;
+
+    explicit LandscapeConstants(const World& world);
+};
+
+/// One worker's landscape and its buffers. Belongs to one thread at a time; its contents never
+/// change results. `world` must outlive it.
+class Landscape {
+  public:
+    explicit Landscape(const World& world);
+
+    /// The columns that version 1's region must hold for `rectangle`: one more on each side.
+    static ColumnRectangle region_for(const ColumnRectangle& rectangle);
+
+    /// Overwrites `out` with the rectangle's columns and `apron` more on each side (0 or 1),
+    /// without flow there. `region` is built for region_for(rectangle).
+    void write(const ColumnWriterOutput& out, const Region& region,
+               const TerrainConstants& constants, const ColumnRectangle& rectangle,
+               std::int32_t apron, const RowKernels& kernels);
+
+  private:
+    void build_fields(const ColumnRectangle& rectangle, const Region& region,
+                      const RowKernels& kernels);
+    void build_ground(const Region& region);
+    void raise_banks(const Region& region);
+
+    const World* world_;
+    LandscapeConstants constants_;
+
+    RectangleShape field_;  ///< the region's shape, grown by what overhangs look at
+    NoiseBuffers noise_;
+    ErosionBuffers erosion_;
+    ReliefBuilder relief_builder_;
+    ReliefRasters relief_;  ///< of field_, then of the region's shape
+    FractureField fractures_;
+    CaveGraph cave_graph_;
+    CaveField caves_;
+    ChannelRasters channels_;
+    OverhangField overhangs_;
+    std::vector<float> folds_;  ///< of field_
+    std::vector<float> raw_;    ///< of field_: height before the rock is asked
+    std::vector<float> fine_;   ///< of field_: the finer gullies
+    std::vector<float> moved_;  ///< of field_: Us, what structure did to the rock at raw height
+    std::vector<float> over_;   ///< of the region's shape from here on
+    std::vector<float> rest_;
+    std::vector<float> ground_;
+    std::vector<float> banks_;  ///< the ground with its banks
+    std::vector<float> soil_;   ///< noise
+    ColumnRuns runs_;
+};
+
+}  // namespace terrane

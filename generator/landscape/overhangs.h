@@ -1,0 +1,67 @@
+// Overhangs: hard layers that lean out over soft ones.
+//
+// For a layer k with resistance over kHard above one under kSoft, thicker than kThickLeast, whose
+// top stands above the column: of all lip columns j within `overhang`,
+//
+//     e = min over j of dist / (reach_j + .5);  j is a lip if raw_j - Us_j >= A_k (raw height of
+//     the layer's top here), pf_j >= .27, fine_j >= -1, |Us_j - Us| <= .4 dist reach = overhang *
+//     clamp01(.6 + 1.6 noise) e < 1: rock from top - t to top, t = .45 thickness (1 - e^2) + 1.2,
+//     top lowered by 1.5 e
+//
+// A dilation of the lips, so that everything hangs together with what it grows from. The air below
+// goes down to the ground; a gap under kGapLeast is filled. One overhang a column, level 0 only.
+#pragma once
+
+#include "generator/landscape/resistance.h"
+#include "generator/terrain/noise.h"
+#include "generator/world/world_definition.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+struct OverhangConstants {
+    std::int32_t reach = 0;           ///< columns; 0: none
+    std::vector<std::size_t> ledges;  ///< layers that can lean out, bottom first
+    Noise noise;
+
+    OverhangConstants(const WorldDefinition& definition, const ResistanceConstants& resistance);
+};
+
+/// What overhangs look at, over a shape that is grown by `reach` on each side.
+struct OverhangInput {
+    RectangleShape field;
+    const float* raw = nullptr;
+    const float* moved = nullptr;  ///< Us
+    const float* crest = nullptr;  ///< pf
+    const float* fine = nullptr;
+};
+
+struct Overhang {
+    float bottom = 0;  ///< voxels
+    float top = 0;
+    std::int32_t layer = -1;  ///< -1: none here
+};
+
+class OverhangField {
+  public:
+    /// Finds the overhangs of a shape `margin` columns inside input.field; `layers` and `ground`
+    /// are that shape's.
+    void build(const OverhangConstants& constants, const ResistanceConstants& resistance,
+               const OverhangInput& input, const RectangleShape& shape, const LayerHeights& layers,
+               const float* ground, const RowKernels& kernels, NoiseBuffers& buffers);
+
+    const Overhang* at(std::size_t i) const {
+        return overhangs_.empty() || overhangs_[i].layer < 0 ? nullptr : &overhangs_[i];
+    }
+
+  private:
+    std::vector<Overhang> overhangs_;
+    std::vector<float> over_;
+    std::vector<float> reach_;
+    std::vector<float> highest_;
+    std::vector<float> row_highest_;
+};
+
+}  // namespace terrane

@@ -1,0 +1,70 @@
+// The relief: how high the land stands between its rivers, from plains to mountains.
+//
+// A lattice every kLatticeStep columns carries, with t the distance to the rivers in half valleys:
+//
+//     w = (1 - q/R^2)^2 / (q + e2)^2 for each reach nearer than R = 1.1 valleys (q: distance^2)
+//     hr = sum(w * level) / sum(w)                               level of the rivers
+//     d = sqrt(max(0, 1/sqrt(sum w) - e2)), t = min(1.4, d / half a valley)
+//     pf = lerp(sqrt(t^2 + .03) - .173, t^2 / (t^2 + .15), plateau)    0 at a river, 1 on a crest
+//     vm = .1 + .9 * step(-.2, .3, noise)                         how mountainous
+//     g = hr + height * vm * pf
+//
+// The sum is a smooth minimum of distances, so that valleys meet in crests (Genevaux et al. 2013)
+// without sorting or a pass over the map. Columns take the uniform cubic B-spline of 4 x 4 points,
+// and its gradient. Levels whose step exceeds the valley take the mean between river and crest.
+#pragma once
+
+#include "generator/landscape/river_graph.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/noise.h"
+#include "generator/world/world_definition.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+inline constexpr std::int64_t kLatticeStep = 8;  ///< columns
+
+struct ReliefConstants {
+    RiverConstants rivers;
+    float height = 0;
+    float valley = 0;
+    float plateau = 0;
+    Noise mountains;
+
+    explicit ReliefConstants(const WorldDefinition& definition);
+};
+
+/// One value a column of a shape: padded_size() each.
+struct ReliefRasters {
+    std::vector<float> ground;    ///< g, voxels
+    std::vector<float> river;     ///< hr, voxels
+    std::vector<float> crest;     ///< pf
+    std::vector<float> mountain;  ///< vm
+    std::vector<float> slope_x;   ///< of g, voxels a column
+    std::vector<float> slope_z;
+    std::vector<float> wander_x;  ///< columns by which the place is moved before a river is sought
+    std::vector<float> wander_z;
+    bool has_rivers = false;  ///< false at levels that are too coarse for them
+};
+
+/// Builds relief for one worker; keeps its rivers and buffers.
+class ReliefBuilder {
+  public:
+    void build(ReliefRasters& out, const ReliefConstants& constants, const RectangleShape& shape,
+               const RowKernels& kernels, NoiseBuffers& buffers);
+
+    const RiverGraph& rivers() const { return rivers_; }
+
+  private:
+    struct Axis;
+
+    void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
+    void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z);
+
+    RiverGraph rivers_;
+    std::vector<float> lattice_;  ///< points of four values: g, hr, pf, vm
+};
+
+}  // namespace terrane

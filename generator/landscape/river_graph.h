@@ -1,0 +1,115 @@
+// Rivers first: the drainage that all relief hangs on.
+//
+// Source: Genevaux, Galin, Guerin, Peytavie, Benes, "Terrain generation using procedural models
+// based on hydrology", 2013: draw the rivers, then raise the land between them. There, rivers grow
+// over the whole map; here every node finds its way alone, so that any place can be asked for:
+//
+// - One node in each cell of a staggered lattice, `valley` columns apart, somewhere inside it. Its
+//   level is a smooth potential plus a little chance.
+// - It flows to the lowest of its six neighbours if that is lower, else it is a sink: a lake, or
+// sea
+//   below the sea level. So rivers only run downhill, join, and never cross.
+// - acc = 1, and kUpstreamSteps times acc = 1 + the sum of acc upstream. The measure of a river's
+//   width at a node is sqrt(acc - 1): a source begins at 0.
+// - A reach is a quadratic curve from a node to the one downstream, in kReachSegments straight
+//   pieces; level and width are linear along it.
+//
+// Everything that looks a place up first moves it by a noise, which makes the rivers wind.
+#pragma once
+
+#include "generator/terrain/noise.h"
+#include "generator/world/world_definition.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace terrane {
+
+inline constexpr std::int32_t kReachSegments = 4;
+inline constexpr std::int32_t kUpstreamSteps = 3;
+/// The nodes that can matter to a place: so many cells around its own.
+inline constexpr std::int64_t kRiverReachCells = 3;
+
+struct RiverConstants {
+    std::int64_t cell_x = 0;  ///< columns
+    std::int64_t cell_z = 0;
+    float ground = 0;
+    float fall = 0;
+    float wander = 0;  ///< columns by which places are moved at most
+    std::uint64_t seed = 0;
+    Noise potential;
+    Noise wander_x;
+    Noise wander_z;
+
+    explicit RiverConstants(const WorldDefinition& definition);
+
+    /// Ground level of the land without its chance part, at a column.
+    float potential_at(std::int64_t x, std::int64_t z) const;
+
+    /// No river level leaves these.
+    double level_max() const;
+
+    std::int64_t row_of(std::int64_t z) const;
+    /// Column of the cell in row j.
+    std::int64_t cell_of(std::int64_t x, std::int64_t j) const;
+};
+
+/// From a node to the one downstream; columns from the node. A sink's reach is a point.
+struct Reach {
+    std::int64_t x = 0;  ///< the node
+    std::int64_t z = 0;
+    std::array<float, kReachSegments + 1> px{};
+    std::array<float, kReachSegments + 1> pz{};
+    std::array<float, kReachSegments> inverse_square{};  ///< 1 / length^2 of each piece, or 0
+    float level = 0;  ///< at the node, then what is added towards the end
+    float level_change = 0;
+    float measure = 0;  ///< of width, likewise
+    float measure_change = 0;
+    float x_min = 0;  ///< its box
+    float x_max = 0;
+    float z_min = 0;
+    float z_max = 0;
+    bool is_sink = false;
+};
+
+/// The nearest point of a reach.
+struct OnReach {
+    float square = 0;  ///< of the distance, columns^2
+    float along = 0;   ///< 0 at the node, 1 at the end
+};
+
+OnReach nearest_on(const Reach& reach, float x, float z);
+
+/// Cells first_i <= i <= last_i, likewise j.
+struct CellRange {
+    std::int64_t first_i = 0;
+    std::int64_t last_i = -1;
+    std::int64_t first_j = 0;
+    std::int64_t last_j = -1;
+
+    friend bool operator==(const CellRange&, const CellRange&) = default;
+};
+
+/// The reaches of a rectangle of cells. Kept from region to region: neighbours ask for the same.
+class RiverGraph {
+  public:
+    /// More are never held: a coarse region of the widest rectangle needs fewer.
+    static constexpr std::size_t kNodesMax = std::size_t{1} << 16U;
+
+    void build(const RiverConstants& constants, const CellRange& range);
+
+    const Reach& reach(std::int64_t i, std::int64_t j) const {
+        return reaches_[static_cast<std::size_t>(
+            (j - range_.first_j) * (range_.last_i - range_.first_i + 1) + (i - range_.first_i))];
+    }
+
+    /// By row, then along it.
+    const std::vector<Reach>& reaches() const { return reaches_; }
+
+  private:
+    CellRange range_;
+    std::vector<Reach> reaches_;
+};
+
+}  // namespace terrane
