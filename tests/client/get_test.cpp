@@ -1,7 +1,7 @@
-#include "client-sample/cpp/get.h"
+#include "client-sample/cpp/program/get.h"
 
-#include "client-sample/cpp/obj.h"
-#include "client-sample/cpp/program.h"
+#include "client-sample/cpp/program/obj.h"
+#include "client-sample/cpp/program/program.h"
 #include "generator/mesh/draco_codec.h"
 #include "generator/volume/chunk_codec.h"
 #include "protocol/wire/column_payload.h"

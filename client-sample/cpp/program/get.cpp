@@ -1,9 +1,9 @@
-#include "client-sample/cpp/get.h"
+#include "client-sample/cpp/program/get.h"
 
 #include "client-sample/cpp/chunk_reader.h"
-#include "client-sample/cpp/get_report.h"
-#include "client-sample/cpp/obj.h"
-#include "client-sample/cpp/program.h"
+#include "client-sample/cpp/program/get_report.h"
+#include "client-sample/cpp/program/obj.h"
+#include "client-sample/cpp/program/program.h"
 #include "protocol/base/write_file.h"
 
 #include <CLI/CLI.hpp>

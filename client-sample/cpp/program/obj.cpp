@@ -1,4 +1,4 @@
-#include "client-sample/cpp/obj.h"
+#include "client-sample/cpp/program/obj.h"
 
 #include <algorithm>
 #include <array>

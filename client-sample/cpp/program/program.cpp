@@ -1,4 +1,4 @@
-#include "client-sample/cpp/program.h"
+#include "client-sample/cpp/program/program.h"
 
 #include "protocol/base/command_line.h"
 

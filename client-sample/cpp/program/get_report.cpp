@@ -1,4 +1,4 @@
-#include "client-sample/cpp/get_report.h"
+#include "client-sample/cpp/program/get_report.h"
 
 #include <nlohmann/json.hpp>
 

@@ -1,0 +1,367 @@
+#include "client-sample/cpp/column_map.h"
+
+#include "client-sample/cpp/chunk_reader.h"
+#include "client-sample/cpp/view_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace terrane {
+
+namespace {
+
+/// Voxels below and above a chunk that its mesh depends on: a cell, and kDistanceMax256 of it.
+constexpr std::int32_t kReachVoxels = 5;
+
+/// All that the meshers read of a definition: the materials' colours.
+WorldDefinition colors_of(const ServerHello& world) {
+    WorldDefinition definition;
+    for (const WireMaterial& wire : world.materials) {
+        Material material;
+        material.color = {.r = static_cast<std::uint8_t>(wire.color_rgb >> 16U),
+                          .g = static_cast<std::uint8_t>(wire.color_rgb >> 8U),
+                          .b = static_cast<std::uint8_t>(wire.color_rgb)};
+        definition.materials.push_back(std::move(material));
+    }
+    return definition;
+}
+
+std::string to_text(ChunkPos key) {
+    return "chunk " + std::to_string(key.lod) + "/" + std::to_string(key.x) + "/" +
+           std::to_string(key.y) + "/" + std::to_string(key.z);
+}
+
+/// A stack of consecutive heights, and where each chunk's palette begins in the joined one.
+struct Piece {
+    const Chunk* chunk = nullptr;
+    std::size_t palette_first = 0;
+};
+
+/// Appends what a chunk knows of a column to what those below it know. Both have the limits next to
+/// the floor between them, which must not come twice; and a chunk above a column's top ends it with
+/// a void at its ceiling, which is no limit of the column.
+template <typename LimitList>
+void append_part(LimitList& column, std::size_t first, const Piece& piece, std::int32_t x,
+                 std::int32_t z, const Palette& palette) {
+    const auto add = [&](Limit limit) {
+        limit.palette_id = static_cast<std::uint16_t>(limit.palette_id + piece.palette_first);
+        const bool is_known = column.size() > first && column.back().y256 == limit.y256 &&
+                              column.back().flow == limit.flow &&
+                              palette[column.back().palette_id] == palette[limit.palette_id];
+        if (!is_known) {
+            column.push_back(limit);
+        }
+    };
+    const Chunk& chunk = *piece.chunk;
+    const std::int64_t floor256 = std::int64_t{chunk.position.y} * chunk.height * kUnitsPerVoxel;
+    const auto limits = chunk.uniform ? std::span<const Limit>() : chunk.columns.column(x, z);
+    const std::int64_t begin256 = chunk.uniform ? floor256 : limits.front().y256;
+    while (column.size() > first && column.back().y256 > begin256) {
+        column.pop_back();
+    }
+    if (chunk.uniform) {
+        const std::int64_t ceiling256 = floor256 + std::int64_t{chunk.height} * kUnitsPerVoxel;
+        for (const std::int64_t y256 : {floor256, ceiling256}) {
+            add({.y256 = static_cast<std::int32_t>(y256), .palette_id = 0, .flow = {}});
+        }
+        return;
+    }
+    for (const Limit& limit : limits) {
+        add(limit);
+    }
+}
+
+}  // namespace
+
+/// Joins pieces to columns; finds each stack's pieces once.
+class ColumnMap::Gathering {
+  public:
+    Gathering(const ColumnMap& map, Palette& palette) : map_(map), palette_(palette) {}
+
+    struct Heights {
+        std::int32_t first = 0;
+        std::int32_t last = 0;  ///< included
+    };
+
+    /// The stack's chunks from `first` to `last`; null if one is not held.
+    const std::vector<Piece>* find(StackPos stack, Heights heights) {
+        const auto known = pieces_.find(stack);
+        if (known != pieces_.end()) {
+            return known->second ? &*known->second : nullptr;
+        }
+        std::optional<std::vector<Piece>>& pieces = pieces_[stack];
+        pieces.emplace();
+        for (std::int32_t y = heights.first; y <= heights.last; ++y) {
+            const Chunk* const chunk =
+                map_.find({.lod = stack.lod, .x = stack.x, .y = y, .z = stack.z});
+            if (chunk == nullptr) {
+                pieces.reset();
+                return nullptr;
+            }
+            pieces->push_back({.chunk = chunk, .palette_first = palette_.size()});
+            if (chunk->uniform) {
+                palette_.push_back(chunk->uniform_content);
+            } else {
+                palette_.insert(palette_.end(), chunk->palette.begin(), chunk->palette.end());
+            }
+        }
+        return &*pieces;
+    }
+
+    /// The column that is number (x, z) of level `lod`, from that level or a finer one, all of
+    /// whose columns are the finer one's too. False if none is held.
+    bool append(Limits& out, std::int32_t lod, ColumnPos place, Heights heights) {
+        for (std::int32_t level = lod; level >= 0; --level) {
+            const std::int64_t x = place.x << (lod - level);
+            const std::int64_t z = place.z << (lod - level);
+            const StackPos stack{.lod = level,
+                                 .x = static_cast<std::int32_t>(floor_div(x, map_.side_)),
+                                 .z = static_cast<std::int32_t>(floor_div(z, map_.side_))};
+            const Heights own =
+                level == lod ? heights
+                             : Heights{.first = 0, .last = level == 0 ? map_.heights_ - 1 : 0};
+            if (const auto* pieces = find(stack, own)) {
+                append(out, *pieces,
+                       {.x = floor_mod(x, map_.side_), .z = floor_mod(z, map_.side_)});
+                return true;
+            }
+        }
+        return false;
+    }
+
+    template <typename LimitList>
+    void append(LimitList& out, std::span<const Piece> pieces, ColumnPos local) const {
+        const std::size_t first = out.size();
+        for (const Piece& piece : pieces) {
+            append_part(out, first, piece, static_cast<std::int32_t>(local.x),
+                        static_cast<std::int32_t>(local.z), palette_);
+        }
+        const auto is_void = [&](std::size_t i) {
+            return palette_[out[i].palette_id].kind == PaletteKind::void_;
+        };
+        while (out.size() > first + 1 && is_void(out.size() - 1) && is_void(out.size() - 2)) {
+            out.pop_back();
+        }
+    }
+
+  private:
+    const ColumnMap& map_;
+    Palette& palette_;
+    std::map<StackPos, std::optional<std::vector<Piece>>> pieces_;
+};
+
+ColumnMap::ColumnMap(const ServerHello& world)
+    : side_(world.chunk_side),
+      height_(world.chunk_height),
+      heights_(heights_of(0, world)),
+      hello_(world),
+      surface_mesher_(colors_of(world)),
+      tile_mesher_(colors_of(world)) {}
+
+Result<void> ColumnMap::put(const ChunkAnswer& answer, std::span<const std::byte> payload) {
+    if (answer.format != ChunkFormat::columns) {
+        return fail(ErrorCode::invalid_argument, to_text(answer.key) + " is " +
+                                                     std::string(to_string(answer.format)) +
+                                                     ", the column map takes columns");
+    }
+    auto content = read_chunk(answer, payload, hello_);
+    if (!content) {
+        return tl::unexpected(content.error());
+    }
+    if (content->chunk) {
+        put(std::move(*content->chunk));
+    } else if (answer.status == ChunkStatus::uniform || answer.status == ChunkStatus::empty) {
+        put(uniform_chunk(answer));
+    }
+    return {};
+}
+
+void ColumnMap::put(Chunk chunk) {
+    const ChunkPos key = chunk.position;
+    chunks_.insert_or_assign(key, std::move(chunk));
+}
+
+/// Its kind follows from its main material: void and caves are the ones that are not solid.
+Chunk ColumnMap::uniform_chunk(const ChunkAnswer& answer) const {
+    Chunk chunk;
+    chunk.position = answer.key;
+    chunk.side = side_;
+    chunk.height = height_;
+    chunk.uniform = true;
+    for (const WireShare& share : answer.uniform) {
+        if (chunk.uniform_content.composition.count < kCompositionMaterialsMax &&
+            share.material < hello_.materials.size()) {
+            chunk.uniform_content.composition.add(share.material, share.concentration);
+        }
+    }
+    const auto shares = chunk.uniform_content.composition.shares();
+    const bool is_solid = !shares.empty() && hello_.materials[shares[0].material].solid;
+    chunk.uniform_content.kind = is_solid ? PaletteKind::layer : PaletteKind::void_;
+    return chunk;
+}
+
+const Chunk* ColumnMap::find(ChunkPos key) const {
+    const auto found = chunks_.find(key);
+    return found == chunks_.end() ? nullptr : &found->second;
+}
+
+std::optional<Voxel> ColumnMap::voxel(VoxelPos place) const {
+    const StackPos stack = stack_of(ColumnPos{.x = place.x, .z = place.z}, side_);
+    const std::int64_t y = floor_div(place.y, height_);
+    if (y < 0 || y >= heights_) {
+        return std::nullopt;
+    }
+    const Chunk* const chunk =
+        find({.lod = 0, .x = stack.x, .y = static_cast<std::int32_t>(y), .z = stack.z});
+    if (chunk == nullptr) {
+        return std::nullopt;
+    }
+    if (chunk->uniform) {
+        Voxel voxel;
+        for (const Share& share : chunk->uniform_content.composition.shares()) {
+            voxel.storage[voxel.count++] = share;
+        }
+        return voxel;
+    }
+    return voxel_of(*chunk, static_cast<std::int32_t>(floor_mod(place.x, side_)),
+                    static_cast<std::int32_t>(floor_mod(place.y, height_)),
+                    static_cast<std::int32_t>(floor_mod(place.z, side_)));
+}
+
+std::optional<bool> ColumnMap::is_solid(VoxelPos place) const {
+    const auto there = voxel(place);
+    if (!there) {
+        return std::nullopt;
+    }
+    const auto main = std::ranges::max_element(there->shares(), {}, &Share::concentration);
+    return main != there->shares().end() && main->material < hello_.materials.size() &&
+           hello_.materials[main->material].solid;
+}
+
+std::optional<HeldColumn> ColumnMap::column(ColumnPos place) const {
+    HeldColumn column;
+    Gathering gathering(*this, column.palette);
+    const auto* const pieces =
+        gathering.find(stack_of(place, side_), {.first = 0, .last = heights_ - 1});
+    if (pieces == nullptr) {
+        return std::nullopt;
+    }
+    gathering.append(column.limits, *pieces,
+                     {.x = floor_mod(place.x, side_), .z = floor_mod(place.z, side_)});
+    return column;
+}
+
+std::optional<double> ColumnMap::ground_under(ColumnPos place, double from_y) const {
+    const auto held = column(place);
+    if (!held) {
+        return std::nullopt;
+    }
+    const auto is_solid_at = [&](std::size_t i) {
+        return held->palette[held->limits[i].palette_id].is_solid();
+    };
+    double ground = 0;  // the base goes down for ever
+    for (std::size_t i = 0; i + 1 < held->limits.size(); ++i) {
+        const Limit& low = held->limits[i];
+        const Limit& high = held->limits[i + 1];
+        if (low.y256 / 256.0 > from_y) {
+            break;
+        }
+        const bool is_interval = low.y256 < high.y256 && is_solid_at(i) && is_solid_at(i + 1);
+        const bool has_solid_over =
+            i + 2 < held->limits.size() && is_solid_at(i + 1) && is_solid_at(i + 2);
+        if (is_interval && !has_solid_over && high.y256 / 256.0 <= from_y) {
+            ground = high.y256 / 256.0;
+        }
+    }
+    return ground;
+}
+
+std::vector<ChunkPos> ColumnMap::needed_for_mesh(ChunkPos key) const {
+    const std::int32_t reach = key.lod > 0 ? 0 : (kReachVoxels + height_ - 1) / height_;
+    const std::int32_t last = key.lod > 0 ? 0 : heights_ - 1;
+    std::vector<ChunkPos> needed;
+    for (std::int32_t z = -1; z <= 1; ++z) {
+        for (std::int32_t x = -1; x <= 1; ++x) {
+            const std::int64_t at_x = std::int64_t{key.x} + x;
+            const std::int64_t at_z = std::int64_t{key.z} + z;
+            if (at_x != static_cast<std::int32_t>(at_x) ||
+                at_z != static_cast<std::int32_t>(at_z)) {
+                continue;
+            }
+            for (std::int32_t y = std::max(key.y - reach, 0); y <= std::min(key.y + reach, last);
+                 ++y) {
+                needed.push_back({.lod = key.lod,
+                                  .x = static_cast<std::int32_t>(at_x),
+                                  .y = y,
+                                  .z = static_cast<std::int32_t>(at_z)});
+            }
+        }
+    }
+    return needed;
+}
+
+std::vector<ChunkPos> ColumnMap::missing_for_mesh(ChunkPos key) const {
+    auto missing = needed_for_mesh(key);
+    std::erase_if(missing, [&](ChunkPos needed) { return holds(needed); });
+    return missing;
+}
+
+Result<Mesh> ColumnMap::mesh(ChunkPos key, MissingNeighbour missing) {
+    const auto lacking = missing_for_mesh(key);
+    const auto is_fatal = [&](ChunkPos lacked) {
+        return missing == MissingNeighbour::refuse || stack_of(lacked) == stack_of(key);
+    };
+    if (const auto found = std::ranges::find_if(lacking, is_fatal); found != lacking.end()) {
+        return fail(ErrorCode::not_found, to_text(key) + ": its mesh needs " + to_text(*found) +
+                                              ", which is not held; ask for it");
+    }
+    Mesh mesh;
+    const std::int32_t last_height = key.lod > 0 ? 0 : heights_ - 1;
+    if (key.y < 0 || key.y > last_height) {
+        return mesh;
+    }
+    const std::int32_t reach = key.lod > 0 ? 0 : (kReachVoxels + height_ - 1) / height_;
+    const Gathering::Heights heights{.first = std::max(key.y - reach, 0),
+                                     .last = std::min(key.y + reach, last_height)};
+    Stack stack;
+    stack.position = stack_of(key);
+    stack.side = side_;
+    stack.columns = {.x_first = -1,
+                     .z_first = -1,
+                     .width = side_ + 2,
+                     .length = side_ + 2,
+                     .offsets = {0},
+                     .limits = {}};
+    Gathering gathering(*this, stack.palette);
+    for (std::int32_t z = -1; z <= side_; ++z) {
+        for (std::int32_t x = -1; x <= side_; ++x) {
+            const ColumnPos place{.x = std::int64_t{key.x} * side_ + x,
+                                  .z = std::int64_t{key.z} * side_ + z};
+            if (!gathering.append(stack.columns.limits, key.lod, place, heights)) {
+                const ColumnPos inside{
+                    .x = std::int64_t{key.x} * side_ + std::clamp(x, 0, side_ - 1),
+                    .z = std::int64_t{key.z} * side_ + std::clamp(z, 0, side_ - 1)};
+                gathering.append(stack.columns.limits, key.lod, inside, heights);
+            }
+            stack.columns.offsets.push_back(
+                static_cast<std::uint32_t>(stack.columns.limits.size()));
+            stack.highest_y256 = std::max(stack.highest_y256, stack.columns.limits.back().y256);
+        }
+    }
+    if (stack.palette.size() > std::numeric_limits<std::uint16_t>::max()) {
+        return fail(ErrorCode::too_large, to_text(key) + ": " +
+                                              std::to_string(stack.palette.size()) +
+                                              " compositions around it are too many for one mesh");
+    }
+    if (key.lod > 0) {
+        tile_mesher_.mesh(mesh, stack, true);
+    } else {
+        surface_mesher_.mesh(mesh, stack, key.y, height_);
+    }
+    return mesh;
+}
+
+}  // namespace terrane
