@@ -5,7 +5,9 @@
 #include "protocol/wire/limits.h"
 #include "server/chunks/build_chunk.h"
 #include "server/chunks/store_identity.h"
+#include "server/http/content_routes.h"
 #include "server/http/core_routes.h"
+#include "server/http/openapi.h"
 #include "server/http/problem.h"
 #include "server/net/native_protocol.h"
 #include "server/net/websocket_protocol.h"
@@ -178,6 +180,10 @@ struct Server::Impl {
         add_chunk_routes(router, routes);
         add_world_routes(router, routes);
         add_state_routes(router, routes);
+        add_tiles3d_routes(router, routes);
+        add_picture_routes(router, routes);
+        add_texture_routes(router, routes);
+        add_openapi_route(router);
         add_viewer_routes(router, options.viewer_files);
     }
 

@@ -102,13 +102,17 @@ Hash128 content_id_of(const World& world) {
     return hash128(bytes);
 }
 
+std::int32_t tile_height_voxels(const World& world) {
+    return static_cast<std::int32_t>(world.stack.height_bound) + 2;
+}
+
 ChunkBuilder::ChunkBuilder(const BuildContext& context)
     : context_(context),
       generator_(*context.world),
       mesher_(context.world->definition),
       blocky_mesher_(context.world->definition),
       tile_mesher_(context.world->definition),
-      tile_height_voxels_(static_cast<std::int32_t>(context.world->stack.height_bound) + 2) {}
+      tile_height_voxels_(tile_height_voxels(*context.world)) {}
 
 Result<Answer> ChunkBuilder::build(const Task& task) {
     if (const auto* chunk = std::get_if<ChunkKey>(&task.key)) {

@@ -32,6 +32,10 @@ namespace terrane {
 /// Names what is served of a world: its fingerprint and how this build encodes it.
 Hash128 content_id_of(const World& world);
 
+/// Voxels that the tallest tile of a whole stack may span, from y = -1 up: the same for every tile
+/// of a world.
+std::int32_t tile_height_voxels(const World& world);
+
 /// What all builders of a server share; everything outlives them and may be used from any thread.
 struct BuildContext {
     const World* world = nullptr;

@@ -18,12 +18,12 @@ struct Question {
 }  // namespace
 
 void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& request,
-                 ThenAnswer then) {
+                 ThenAnswer then, std::int32_t priority) {
     const WaiterId id = service.new_waiter_id();
     const auto question = std::make_shared<Question>();
     question->then = std::move(then);
     const auto outcome = service.request(
-        key, 0,
+        key, priority,
         {.id = id, .answer = [question](const Result<Answer>& result) { question->then(result); }});
     if (!outcome) {
         question->then(tl::unexpected(outcome.error()));

@@ -4,6 +4,7 @@
 #include "server/chunks/chunk_service.h"
 #include "server/http/http_message.h"
 
+#include <cstdint>
 #include <functional>
 
 namespace terrane {
@@ -12,8 +13,9 @@ namespace terrane {
 /// it on. If the client goes first, the question is taken back and `then` may never be called.
 using ThenAnswer = std::function<void(const Result<Answer>&)>;
 
-/// Asks for one chunk or column on behalf of `request`. `service` outlives all answers.
+/// Asks for one piece of work on behalf of `request`; a higher priority is served sooner. `service`
+/// outlives all answers.
 void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& request,
-                 ThenAnswer then);
+                 ThenAnswer then, std::int32_t priority = 0);
 
 }  // namespace terrane

@@ -55,22 +55,24 @@ Result<ChunkPos> position_of(const RouteParams& params) {
 }
 
 HttpHandler chunk_handler(const RouteContext& context, ChunkFormat format) {
-    return [service = context.service, world = context.world, format](
+    const std::string_view type =
+        format == ChunkFormat::glb ? "model/gltf-binary" : "application/octet-stream";
+    return [service = context.service, world = context.world, format, type](
                const HttpRequest& request, const RouteParams& params, HttpRespond respond) {
         const auto position = position_of(params);
         if (!position) {
             respond(http_problem(position.error()));
             return;
         }
-        ask_service(*service, ChunkKey{.position = *position, .format = format}, request,
-                    [service, world, respond = std::move(respond)](const Result<Answer>& answer) {
-                        if (!answer) {
-                            respond(http_problem(answer.error(), service->retry_after_ms()));
-                            return;
-                        }
-                        respond(chunk_response(*std::get<ServedChunk>(*answer).chunk,
-                                               "application/octet-stream", *world));
-                    });
+        ask_service(
+            *service, ChunkKey{.position = *position, .format = format}, request,
+            [service, world, type, respond = std::move(respond)](const Result<Answer>& answer) {
+                if (!answer) {
+                    respond(http_problem(answer.error(), service->retry_after_ms()));
+                    return;
+                }
+                respond(chunk_response(*std::get<ServedChunk>(*answer).chunk, type, *world));
+            });
     };
 }
 
@@ -138,6 +140,8 @@ void add_chunk_routes(Router& router, const RouteContext& context) {
                           .handler = chunk_handler(context, ChunkFormat::draco_blocky)});
     router.add_versioned({.path = "/chunks/{lod}/{x}/{y}/{z}.drc",
                           .handler = chunk_handler(context, ChunkFormat::draco)});
+    router.add_versioned({.path = "/chunks/{lod}/{x}/{y}/{z}.glb",
+                          .handler = chunk_handler(context, ChunkFormat::glb)});
     router.add_versioned({.path = "/chunks/{lod}/{x}/{y}/{z}.columns",
                           .handler = chunk_handler(context, ChunkFormat::columns)});
 }
@@ -160,8 +164,15 @@ std::string world_json(const RouteContext& context, const std::string& versioned
         links["world_file"] = versioned_prefix + "/world.toml";
     }
     links["chunk"] = versioned_prefix + "/chunks/{lod}/{x}/{y}/{z}.drc";
+    links["glb"] = versioned_prefix + "/chunks/{lod}/{x}/{y}/{z}.glb";
     links["columns"] = versioned_prefix + "/chunks/{lod}/{x}/{y}/{z}.columns";
     links["column"] = versioned_prefix + "/columns/{x}/{z}.json";
+    links["map"] = versioned_prefix + "/map/{zoom}/{x}/{y}.png";
+    links["section"] = versioned_prefix + "/sections/{x0},{z0}/{x1},{z1}.png";
+    links["tileset"] = versioned_prefix + "/3dtiles/tileset.json";
+    links["tileset_on_globe"] = versioned_prefix + "/3dtiles/tileset-geo.json";
+    links["tileset_explicit"] = versioned_prefix + "/3dtiles/explicit/tileset.json";
+    links["openapi"] = "/v1/openapi.json";
     links["websocket"] = "/ws";
     const Json json = {{"name", hello.world_name},
                        {"fingerprint", to_hex(hello.fingerprint)},

@@ -22,7 +22,7 @@ struct RouteContext {
     std::function<std::string()> metrics;  ///< in Prometheus' text format
 };
 
-/// /chunks/{lod}/{x}/{y}/{z}.drc, .blocky.drc, .columns under the content id.
+/// /chunks/{lod}/{x}/{y}/{z}.drc, .blocky.drc, .glb, .columns under the content id.
 void add_chunk_routes(Router& router, const RouteContext& context);
 /// /v1/world, world.toml and columns/{x}/{z}.json.
 void add_world_routes(Router& router, const RouteContext& context);
