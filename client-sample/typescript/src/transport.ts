@@ -22,52 +22,66 @@ export interface WebSocketLike {
 
 const CONNECT_TIMEOUT_MS = 10_000;
 
-/** Resolves once the socket is open. `make`: how to, where there is no WebSocket (Node below 22). */
-export function connectWebSocket(
-    url: string,
-    make: (url: string) => WebSocketLike = (to) => new WebSocket(to) as WebSocketLike,
-): Promise<Transport> {
-    return new Promise((resolve, reject) => {
-        const socket = make(url);
+class WebSocketTransport implements Transport {
+    onFrame: ((frame: Uint8Array) => void) | undefined;
+    onClose: ((reason?: string) => void) | undefined;
+    private isOpen = false;
+    private isClosed = false;
+
+    constructor(
+        private readonly socket: WebSocketLike,
+        url: string,
+        opened: (transport: Transport) => void,
+        failed: (error: Error) => void,
+    ) {
         socket.binaryType = 'arraybuffer';
-        let isOpen = false;
-        let isClosed = false;
-        const transport: Transport = {
-            send: (frame) => socket.send(frame),
-            close: () => socket.close(),
-            onFrame: undefined,
-            onClose: undefined,
+        const end = (reason: string) => {
+            clearTimeout(timer);
+            if (this.isClosed) {
+                return;
+            }
+            this.isClosed = true;
+            if (this.isOpen) {
+                this.onClose?.(reason);
+            } else {
+                failed(new Error(reason));
+            }
         };
         const timer = setTimeout(() => {
             end(`no answer from ${url} in ${CONNECT_TIMEOUT_MS / 1000} s`);
             socket.close();
         }, CONNECT_TIMEOUT_MS);
-        const end = (reason?: string) => {
-            clearTimeout(timer);
-            if (isClosed) {
-                return;
-            }
-            isClosed = true;
-            if (isOpen) {
-                transport.onClose?.(reason);
-            } else {
-                reject(new Error(reason ?? `cannot connect to ${url}`));
-            }
-        };
+        const broken = () => (this.isOpen ? 'the connection ended' : `cannot connect to ${url}`);
         socket.onopen = () => {
             clearTimeout(timer);
-            isOpen = true;
-            resolve(transport);
+            this.isOpen = true;
+            opened(this);
         };
         socket.onmessage = (event) => {
             if (event.data instanceof ArrayBuffer) {
-                transport.onFrame?.(new Uint8Array(event.data));
+                this.onFrame?.(new Uint8Array(event.data));
             } else {
                 end('the server sent text where frames are due');
                 socket.close();
             }
         };
-        socket.onclose = (event) => end(event.reason || (isOpen ? 'the connection ended' : undefined));
-        socket.onerror = () => end(isOpen ? 'the connection failed' : `cannot connect to ${url}`);
-    });
+        socket.onclose = (event) => end(event.reason || broken());
+        socket.onerror = () => end(broken());
+    }
+
+    send(frame: Uint8Array): void {
+        this.socket.send(frame);
+    }
+
+    close(): void {
+        this.socket.close();
+    }
+}
+
+/** Resolves once the socket is open. `make`: how to, where there is no WebSocket (Node below 22). */
+export function connectWebSocket(
+    url: string,
+    make: (url: string) => WebSocketLike = (to) => new WebSocket(to) as WebSocketLike,
+): Promise<Transport> {
+    return new Promise((resolve, reject) => new WebSocketTransport(make(url), url, resolve, reject));
 }
