@@ -9,7 +9,9 @@
 #include "server/http/core_routes.h"
 #include "server/http/openapi.h"
 #include "server/http/problem.h"
+#include "server/metrics.h"
 #include "server/net/native_protocol.h"
+#include "server/net/tokens.h"
 #include "server/net/websocket_protocol.h"
 #include "server/notice_limit.h"
 #include "storage/memory_store.h"
@@ -18,6 +20,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <string>
 #include <utility>
@@ -73,6 +76,51 @@ ServerHello hello_of(const World& world) {
                                    .solid = is_solid(material.kind)});
     }
     return hello;
+}
+
+/// Everybody's entrance: both ports' TLS, and the tokens.
+struct Doors {
+    std::unique_ptr<TlsServer> tls;
+    std::unique_ptr<TokenGate> gate;
+
+    /// What the bearer of a token may do.
+    Result<SessionCaps> admit(std::string_view token, SessionCaps caps) const {
+        const auto changed = gate->admit(token, std::chrono::system_clock::now());
+        if (!changed) {
+            return tl::unexpected(changed.error());
+        }
+        caps.view_radius_max = changed->view_radius_max.value_or(caps.view_radius_max);
+        caps.bytes_per_second_max =
+            changed->bytes_per_second_max.value_or(caps.bytes_per_second_max);
+        caps.requests_per_second_max =
+            changed->requests_per_second_max.value_or(caps.requests_per_second_max);
+        caps.credit_window_bytes = changed->credit_window_bytes.value_or(caps.credit_window_bytes);
+        return caps;
+    }
+};
+
+Result<Doors> open_doors(const ServerOptions& options) {
+    Doors doors;
+    if (options.tls) {
+        auto tls = TlsServer::open(*options.tls);
+        if (!tls) {
+            return tl::unexpected(tls.error());
+        }
+        doors.tls = *std::move(tls);
+    }
+    std::vector<TokenEntry> tokens;
+    if (!options.token_file.empty()) {
+        auto read = read_tokens(options.token_file);
+        if (!read) {
+            return tl::unexpected(read.error());
+        }
+        tokens = *std::move(read);
+    }
+    doors.gate = std::make_unique<TokenGate>(
+        TokenGate::Options{.anonymous = options.anonymous.value_or(options.token_file.empty()),
+                           .world = options.world->fingerprint},
+        std::move(tokens));
+    return doors;
 }
 
 constexpr const char* kNoRoom = "too many sessions are open";
@@ -133,8 +181,11 @@ std::size_t raise_descriptor_limit() {
 
 /// In order of construction; `stop` ends them in reverse.
 struct Server::Impl {
-    Impl(const ServerOptions& options, const Log& server_log, std::unique_ptr<ChunkStore> opened)
+    Impl(const ServerOptions& options, const Log& server_log, std::unique_ptr<ChunkStore> opened,
+         Doors opened_doors)
         : log(server_log),
+          doors(std::move(opened_doors)),
+          token_file(options.token_file),
           world(options.world),
           store(std::move(opened)),
           stacks(options.stack_cache_bytes_max),
@@ -155,22 +206,40 @@ struct Server::Impl {
                                       log.warning(failure);
                                   }
                               }});
-                      return [builder = std::move(builder)](const Task& task) {
-                          return builder->build(task);
+                      return [this, builder = std::move(builder)](const Task& task) {
+                          const auto queued = std::chrono::steady_clock::now() - task.asked;
+                          auto answer = builder->build(task);
+                          metrics.observe(
+                              answer,
+                              std::chrono::duration_cast<std::chrono::microseconds>(queued));
+                          return answer;
                       };
                   }),
           sessions{.service = &service,
                    .hello = hello_of(*world),
-                   .world_file = canonical_world_file(world->definition),
+                   .world_file = options.publish_world ? canonical_world_file(world->definition)
+                                                       : std::string(),
                    .timeouts = options.timeouts,
-                   .caps = options.caps},
+                   .caps = options.caps,
+                   .admit =
+                       [this](const ClientHello& hello) {
+                           return doors.admit(hello.token, sessions.caps);
+                       }},
           routes{.service = &service,
                  .world = world.get(),
                  .hello = &sessions.hello,
                  .world_file = sessions.world_file,
                  .is_ready = [this] { return !draining.load(); },
-                 .metrics = [] { return std::string(); }},
-          router(sessions.hello.content_id),
+                 .metrics = [this] { return metrics.text(samples()); }},
+          router(sessions.hello.content_id,
+                 [this](const HttpRequest& request) -> Result<void> {
+                     const auto caps =
+                         doors.admit(token_of(request.authorization, request.query), sessions.caps);
+                     if (!caps) {
+                         return tl::unexpected(caps.error());
+                     }
+                     return {};
+                 }),
           http{.router = &router,
                .counters = &http_counters,
                .next_request_id = &next_request_id,
@@ -192,21 +261,28 @@ struct Server::Impl {
         out.push_back({.name = "tcp",
                        .endpoint = options.listen.endpoint,
                        .make = native_protocol(sessions),
-                       .refusal = native_refusal()});
+                       .refusal = native_refusal(),
+                       .tls = doors.tls.get()});
         if (options.http) {
             out.push_back({.name = "http",
                            .endpoint = *options.http,
                            .make = http_protocol(http),
-                           .refusal = http_refusal()});
+                           .refusal = http_refusal(),
+                           .tls = doors.tls.get()});
         }
         return out;
     }
 
+    std::vector<MetricSample> samples();
+
     const Log& log;
+    const Doors doors;
+    const std::filesystem::path token_file;
     const std::shared_ptr<const World> world;
     const std::unique_ptr<ChunkStore> store;
     NoticeLimit store_notices{std::chrono::minutes{1}};
     ServiceCounters counters;
+    Metrics metrics;
     StackCache stacks;
     ChunkService service;
     SessionContext sessions;
@@ -220,14 +296,80 @@ struct Server::Impl {
     std::unique_ptr<Listener> listener;
 };
 
+std::vector<MetricSample> Server::Impl::samples() {
+    using Kind = MetricSample::Kind;
+    std::vector<MetricSample> out;
+    const auto add = [&out](Kind kind, const char* name, const char* help, auto value,
+                            const char* label = "") {
+        out.push_back({.name = name,
+                       .help = help,
+                       .kind = kind,
+                       .value = static_cast<double>(value),
+                       .label = label});
+    };
+    const auto counter = [&add](const char* name, const char* help, const auto& value,
+                                const char* label = "") {
+        add(Kind::counter, name, help, value.load(std::memory_order_relaxed), label);
+    };
+    const auto gauge = [&add](const char* name, const char* help, auto value) {
+        add(Kind::gauge, name, help, value);
+    };
+    const char* const outcomes = "Chunk requests, by outcome";
+    const char* const requests = "terrane_requests_total";
+    add(Kind::counter, requests, outcomes, count_of(counters.cache_hits), "outcome=cache");
+    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::store), "outcome=store");
+    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::generated),
+        "outcome=generated");
+    add(Kind::counter, requests, outcomes, count_of(counters.busy), "outcome=busy");
+    add(Kind::counter, requests, outcomes, count_of(counters.cancelled), "outcome=cancelled");
+    add(Kind::counter, requests, outcomes, count_of(counters.failed), "outcome=failed");
+    counter("terrane_generations_total", "Chunk stacks made", counters.generations);
+    counter("terrane_joins_total", "Requests that joined one in flight", counters.joins);
+    counter("terrane_stack_hits_total", "Stacks found in memory", counters.stack_hits);
+    gauge("terrane_queue_jobs", "Stacks that wait for a worker", service.queued_jobs());
+    gauge("terrane_in_flight_keys", "Keys that wait or are being made", service.in_flight());
+    gauge("terrane_cache_bytes", "Encoded chunks in memory", service.cache_bytes());
+    gauge("terrane_stack_cache_bytes", "Stacks in memory", stacks.size_bytes());
+    const StoreStats stats = store->stats();
+    counter("terrane_store_hits_total", "Records found in the store", counters.store_hits);
+    add(Kind::counter, "terrane_store_gets_total", "Records asked of the store", stats.gets);
+    add(Kind::counter, "terrane_store_puts_total", "Records written to the store", stats.puts);
+    add(Kind::counter, "terrane_store_corrupt_total", "Records that could not be read back",
+        stats.corrupt + count_of(counters.store_corrupt));
+    add(Kind::counter, "terrane_store_failures_total", "Reads or writes that the disk refused",
+        stats.failures);
+    if (listener) {
+        const TrafficCounters& traffic = listener->traffic();
+        gauge("terrane_sessions", "Connections that are open", listener->sessions());
+        counter("terrane_connections_total", "Connections taken", traffic.accepted);
+        counter("terrane_connections_refused_total", "Connections refused at a limit",
+                traffic.refused);
+        counter("terrane_tls_failures_total", "TLS handshakes that failed", traffic.tls_failed);
+        counter("terrane_received_bytes_total", "Bytes from clients", traffic.bytes_in);
+        counter("terrane_sent_bytes_total", "Bytes to clients", traffic.bytes_out);
+    }
+    const char* const classes = "HTTP answers, by the class of their status";
+    constexpr std::array<const char*, 4> kLabels = {"status=2xx", "status=3xx", "status=4xx",
+                                                    "status=5xx"};
+    for (std::size_t i = 0; i < kLabels.size(); ++i) {
+        counter("terrane_http_answers_total", classes, http_counters.by_class[i + 2], kLabels[i]);
+    }
+    counter("terrane_http_not_modified_total", "HTTP answers 304", http_counters.not_modified);
+    return out;
+}
+
 Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, const Log& log) {
+    auto doors = open_doors(options);
+    if (!doors) {
+        return tl::unexpected(doors.error());
+    }
     auto store = open_store(options, log);
     if (!store) {
         return tl::unexpected(store.error());
     }
     std::unique_ptr<Impl> impl;
     try {
-        impl = std::make_unique<Impl>(options, log, *std::move(store));
+        impl = std::make_unique<Impl>(options, log, *std::move(store), *std::move(doors));
     } catch (const std::exception& error) {
         return fail(ErrorCode::internal, std::to_string(options.workers) +
                                              " workers cannot be started: " + error.what() +
@@ -270,6 +412,29 @@ std::optional<Endpoint> Server::http_endpoint() const {
 
 const ServiceCounters& Server::counters() const {
     return impl_->counters;
+}
+
+std::string Server::metrics_text() const {
+    return impl_->metrics.text(impl_->samples());
+}
+
+void Server::reload() {
+    const Doors& doors = impl_->doors;
+    if (doors.tls) {
+        if (const auto reloaded = doors.tls->reload(); reloaded) {
+            impl_->log.info("certificate and key were read again");
+        } else {
+            impl_->log.error("the old certificate stays in force: " + reloaded.error().message);
+        }
+    }
+    if (!impl_->token_file.empty()) {
+        if (auto tokens = read_tokens(impl_->token_file); tokens) {
+            impl_->log.info("tokens were read again", {{"tokens", std::uint64_t{tokens->size()}}});
+            doors.gate->replace(*std::move(tokens));
+        } else {
+            impl_->log.error("the old tokens stay in force: " + tokens.error().message);
+        }
+    }
 }
 
 std::size_t Server::sessions() const {

@@ -10,12 +10,14 @@
 #include "server/net/http_session.h"
 #include "server/net/listener.h"
 #include "server/net/session.h"
+#include "server/net/tls.h"
 
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace terrane {
@@ -32,7 +34,11 @@ struct ServerOptions {
     SessionTimeouts timeouts;
     HttpTimeouts http_timeouts;
     std::vector<ViewerFile> viewer_files;
-    SessionCaps caps;  ///< of every session; clamped
+    SessionCaps caps;                     ///< of every session; clamped
+    bool publish_world = true;            ///< clients may have the world file
+    std::optional<TlsServer::Files> tls;  ///< of both ports
+    std::filesystem::path token_file;     ///< empty: none
+    std::optional<bool> anonymous;        ///< default: if there is no token file
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;
@@ -47,7 +53,7 @@ struct MemoryBound {
     std::size_t workers = 0;   ///< their scratch buffers
     std::size_t sessions = 0;  ///< every session with a full outbox and one answer more, a frame
                                ///< half read, all the wishes it may have and the largest view
-    std::size_t queue = 0;  ///< work that waits, and who waits for it
+    std::size_t queue = 0;     ///< work that waits, and who waits for it
 
     std::size_t sum() const { return caches + store + workers + sessions + queue; }
 };
@@ -57,7 +63,7 @@ MemoryBound memory_bound_of(const ServerOptions& options);
 /// Raises the limit of open descriptors as far as the system lets us, and gives it.
 std::size_t raise_descriptor_limit();
 
-/// Calls from the owner's thread, but `counters`: any.
+/// Calls from the owner's thread, but `counters` and `metrics_text`: any.
 class Server {
   public:
     /// Opens the store, starts the workers, listens. `log` outlives the server. Fails with what the
@@ -72,6 +78,11 @@ class Server {
     Endpoint endpoint() const;
     std::optional<Endpoint> http_endpoint() const;
     const ServiceCounters& counters() const;
+    /// What /metrics says.
+    std::string metrics_text() const;
+    /// Reads certificate, key and tokens again. What can't be used leaves the old in force; the log
+    /// says so.
+    void reload();
     std::size_t sessions() const;
     /// Accepts no more, says goodbye, answers what is under way for at most `drain_time`, then
     /// stops the workers and flushes the store.

@@ -439,7 +439,7 @@ Client::~Client() = default;
 
 Result<Client> Client::connect(const ClientOptions& options) {
     const Deadline deadline = steady_clock::now() + options.timeout;
-    auto connection = Connection::open(options.host, options.port, deadline);
+    auto connection = Connection::open(options.host, options.port, options.tls, deadline);
     if (!connection) {
         return tl::unexpected(connection.error());
     }

@@ -45,6 +45,7 @@ struct ClientOptions {
         5000};  ///< for connecting with its greeting, and for each sending
     std::string client_name = "terrane-client";
     std::string token;
+    TlsUse tls;
 };
 
 /// The payload is as received; chunk_reader.h makes a mesh or columns of it.

@@ -4,8 +4,10 @@
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
 #include <boost/asio/write.hpp>
 
+#include <optional>
 #include <vector>
 
 namespace terrane {
@@ -22,6 +24,8 @@ constexpr std::size_t kReceiveBytes = std::size_t{64} << 10U;
 struct Connection::Socket {
     asio::io_context context;
     asio::ip::tcp::socket socket{context};
+    std::optional<asio::ssl::context> tls_context;
+    std::optional<asio::ssl::stream<asio::ip::tcp::socket&>> tls;
     std::vector<std::byte> received = std::vector<std::byte>(kReceiveBytes);
     std::string peer;
 
@@ -39,6 +43,47 @@ struct Connection::Socket {
         return false;
     }
 
+    /// Calls `use` with what bytes go through: the socket, or TLS on it.
+    template <typename Use>
+    void with_stream(Use use) {
+        if (tls) {
+            use(*tls);
+        } else {
+            use(socket);
+        }
+    }
+
+    Result<void> shake_hands(const std::string& host, const std::string& ca_file,
+                             Deadline deadline) {
+        error_code error;
+        tls_context.emplace(asio::ssl::context::tls_client);
+        SSL_CTX_set_min_proto_version(tls_context->native_handle(), TLS1_2_VERSION);
+        if (ca_file.empty()) {
+            tls_context->set_default_verify_paths(error);
+        } else {
+            tls_context->load_verify_file(ca_file, error);
+        }
+        if (error) {
+            return fail(ErrorCode::io_error,
+                        (ca_file.empty() ? "the system's certificates" : ca_file) +
+                            ": cannot be read: " + error.message());
+        }
+        tls.emplace(socket, *tls_context);
+        tls->set_verify_mode(asio::ssl::verify_peer, error);
+        tls->set_verify_callback(asio::ssl::host_name_verification(host), error);
+        SSL_set_tlsext_host_name(tls->native_handle(), host.c_str());
+        error_code outcome = error;
+        tls->async_handshake(asio::ssl::stream_base::client,
+                             [&](error_code shaken) { outcome = shaken; });
+        if (!run_until(deadline, [this] { socket.cancel(); })) {
+            return failure("no TLS handshake in time");
+        }
+        if (outcome) {
+            return failure("TLS: " + outcome.message());
+        }
+        return {};
+    }
+
     tl::unexpected<Error> failure(const std::string& what) const {
         return fail(ErrorCode::io_error, peer + ": " + what);
     }
@@ -50,7 +95,7 @@ Connection::Connection(Connection&&) noexcept = default;
 Connection& Connection::operator=(Connection&&) noexcept = default;
 Connection::~Connection() = default;
 
-Result<Connection> Connection::open(const std::string& host, std::uint16_t port,
+Result<Connection> Connection::open(const std::string& host, std::uint16_t port, const TlsUse& tls,
                                     Deadline deadline) {
     auto opened = std::make_unique<Socket>();
     opened->peer = host + ":" + std::to_string(port);
@@ -80,13 +125,20 @@ Result<Connection> Connection::open(const std::string& host, std::uint16_t port,
     }
     // Requests are small and wanted at once.
     opened->socket.set_option(asio::ip::tcp::no_delay(true), outcome);
+    if (tls.enabled) {
+        if (const auto shaken = opened->shake_hands(host, tls.ca_file, deadline); !shaken) {
+            return tl::unexpected(shaken.error());
+        }
+    }
     return Connection(std::move(opened));
 }
 
 Result<void> Connection::send(std::span<const std::byte> bytes, Deadline deadline) {
     error_code outcome;
-    asio::async_write(socket_->socket, asio::buffer(bytes.data(), bytes.size()),
-                      [&](error_code error, std::size_t) { outcome = error; });
+    socket_->with_stream([&](auto& stream) {
+        asio::async_write(stream, asio::buffer(bytes.data(), bytes.size()),
+                          [&](error_code error, std::size_t) { outcome = error; });
+    });
     if (!socket_->run_until(deadline, [this] { socket_->socket.cancel(); })) {
         return socket_->failure("the server does not take what is sent to it");
     }
@@ -99,11 +151,13 @@ Result<void> Connection::send(std::span<const std::byte> bytes, Deadline deadlin
 Result<std::span<const std::byte>> Connection::receive(Deadline deadline) {
     error_code outcome;
     std::size_t received_bytes = 0;
-    socket_->socket.async_read_some(asio::buffer(socket_->received),
-                                    [&](error_code error, std::size_t size_bytes) {
-                                        outcome = error;
-                                        received_bytes = size_bytes;
-                                    });
+    socket_->with_stream([&](auto& stream) {
+        stream.async_read_some(asio::buffer(socket_->received),
+                               [&](error_code error, std::size_t size_bytes) {
+                                   outcome = error;
+                                   received_bytes = size_bytes;
+                               });
+    });
     const bool in_time = socket_->run_until(deadline, [this] { socket_->socket.cancel(); });
     if (received_bytes > 0) {
         return std::span<const std::byte>(socket_->received).first(received_bytes);
@@ -111,7 +165,7 @@ Result<std::span<const std::byte>> Connection::receive(Deadline deadline) {
     if (!in_time) {
         return std::span<const std::byte>();
     }
-    if (outcome == asio::error::eof) {
+    if (outcome == asio::error::eof || outcome == asio::ssl::error::stream_truncated) {
         return socket_->failure("the server closed the connection");
     }
     return socket_->failure(outcome.message());

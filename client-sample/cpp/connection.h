@@ -1,4 +1,5 @@
-// A TCP connection that never waits past a deadline. The only file of the client that knows Asio.
+// A TCP connection, with TLS in it if wanted, that never waits past a deadline. The only file of
+// the client that knows Asio.
 #pragma once
 
 #include "protocol/base/result.h"
@@ -14,12 +15,21 @@ namespace terrane {
 
 using Deadline = std::chrono::steady_clock::time_point;
 
+/// Whether and how a connection is encrypted.
+struct TlsUse {
+    bool enabled = false;
+    /// PEM certificates that the server's must be signed by; empty: those that the system trusts.
+    std::string ca_file = {};
+};
+
 /// One thread. Errors are `io_error` with the system's words; the connection is of no use
 /// afterwards.
 class Connection {
   public:
-    /// Resolves the name and connects, trying each of its addresses.
-    static Result<Connection> open(const std::string& host, std::uint16_t port, Deadline deadline);
+    /// Resolves the name and connects, trying each of its addresses. With TLS the server's
+    /// certificate must be good for that name.
+    static Result<Connection> open(const std::string& host, std::uint16_t port, const TlsUse& tls,
+                                   Deadline deadline);
 
     Connection(Connection&&) noexcept;
     Connection& operator=(Connection&&) noexcept;

@@ -22,6 +22,7 @@ int run_program(int argc, char** argv) {
     int exit_code = kExitDone;
     add_preseed_command(app, exit_code);
     add_serve_command(app, exit_code);
+    add_token_command(app, exit_code);
     add_verify_command(app, exit_code);
     add_world_command(app, exit_code);
     add_column_command(app, exit_code);

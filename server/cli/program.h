@@ -18,6 +18,7 @@ int run_program(int argc, char** argv);
 // outlive the parse.
 void add_preseed_command(CLI::App& app, int& exit_code);
 void add_serve_command(CLI::App& app, int& exit_code);
+void add_token_command(CLI::App& app, int& exit_code);
 void add_verify_command(CLI::App& app, int& exit_code);
 void add_world_command(CLI::App& app, int& exit_code);
 void add_column_command(CLI::App& app, int& exit_code);

@@ -8,53 +8,54 @@
 #include "protocol/wire/limits.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
+#include "server/config.h"
 #include "server/server.h"
 
 #include <CLI/CLI.hpp>
 #include <pthread.h>
+#include <unistd.h>
 
-#include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
-#include <thread>
+#include <vector>
 
 namespace terrane {
 namespace {
 
-constexpr std::size_t kCacheMibMax = std::size_t{1} << 20U;
-
-struct ServeArguments {
-    std::string world;
-    std::string data;
-    std::string tcp = "127.0.0.1:7777";
-    std::string http = "127.0.0.1:8080";
-    std::size_t workers =
-        std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kWorkersMax);
-    std::size_t cache_mib = 256;
-    std::string store = "rocksdb";
-    std::string log_format = "text";
-    std::string log_level = "info";
+/// As the command line gives them.
+struct ServeFlags {
+    std::string config;
+    bool print_config = false;
+    std::vector<std::string> values;  ///< one a setting
 };
 
-/// Takes the two signals from every thread that starts after it and gives them to `wait`.
-class StopSignals {
+/// Takes the signals from every thread that starts after it and gives them to `wait`.
+class ServerSignals {
   public:
-    StopSignals() {
+    ServerSignals() {
         sigemptyset(&signals_);
-        sigaddset(&signals_, SIGINT);
-        sigaddset(&signals_, SIGTERM);
+        for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+            sigaddset(&signals_, signal);
+        }
         pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
         std::signal(SIGPIPE, SIG_IGN);  // a client that left is an error code
     }
 
-    /// Waits for one; from then on the next one ends the program.
-    std::string wait() const {
+    /// Waits for the order to stop; from then on the next one ends the program. Meanwhile SIGHUP
+    /// calls `reload`.
+    template <typename Reload>
+    std::string wait(Reload reload) const {
         int signal = 0;
-        sigwait(&signals_, &signal);
+        while (sigwait(&signals_, &signal) != 0 || signal == SIGHUP) {
+            reload();
+        }
         std::signal(SIGINT, SIG_DFL);
         std::signal(SIGTERM, SIG_DFL);
+        std::signal(SIGHUP, SIG_IGN);
         pthread_sigmask(SIG_UNBLOCK, &signals_, nullptr);
         return signal == SIGINT ? "SIGINT" : "SIGTERM";
     }
@@ -65,6 +66,15 @@ class StopSignals {
 
 std::uint64_t mib(std::size_t bytes) {
     return bytes >> 20U;
+}
+
+/// What this machine has; 0 if it doesn't say.
+std::size_t physical_bytes() {
+    const long pages = sysconf(_SC_PHYS_PAGES);
+    const long page_bytes = sysconf(_SC_PAGESIZE);
+    return pages > 0 && page_bytes > 0
+               ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes)
+               : 0;
 }
 
 void log_start(const Log& log, const ServerOptions& options, std::size_t descriptors) {
@@ -81,9 +91,23 @@ void log_start(const Log& log, const ServerOptions& options, std::size_t descrip
                     {{"descriptors", std::uint64_t{descriptors}},
                      {"sessions_max", std::uint64_t{options.listen.sessions_max}}});
     }
-    if (!is_loopback(options.listen.endpoint)) {
-        log.warning("this address can be reached from other machines, unencrypted and by anybody",
-                    {{"tcp", to_string(options.listen.endpoint)}});
+    if (const std::size_t physical = physical_bytes(); physical > 0 && bound.sum() > physical) {
+        log.warning(
+            "the memory bound is above what this machine has; fewer --sessions-max lower it",
+            {{"sum_mib", mib(bound.sum())}, {"machine_mib", mib(physical)}});
+    }
+    const bool has_tokens = !options.token_file.empty() && !options.anonymous.value_or(false);
+    for (const auto& endpoint : {std::optional(options.listen.endpoint), options.http}) {
+        if (endpoint && !is_loopback(*endpoint) && !(options.tls && has_tokens)) {
+            log.warning(
+                options.tls  ? "this address can be reached from other machines, by anybody; "
+                               "--tokens says who may come in"
+                : has_tokens ? "this address can be reached from other machines, unencrypted: "
+                               "tokens can be overheard; use --tls-cert and --tls-key"
+                             : "this address can be reached from other machines, unencrypted "
+                               "and by anybody; use --tls-cert, --tls-key and --tokens",
+                {{"address", to_string(*endpoint)}});
+        }
     }
 }
 
@@ -92,71 +116,125 @@ int wrong_use(const std::string& message) {
     return kExitWrongUse;
 }
 
-int run_serve(const ServeArguments& arguments) {
-    const auto endpoint = parse_endpoint(arguments.tcp);
+/// Defaults, then the file, then the flags.
+Result<ServerConfig> config_of(const ServeFlags& flags, const std::vector<bool>& given) {
+    ServerConfig config;
+    if (!flags.config.empty()) {
+        if (const auto read = set_from_file(config, flags.config); !read) {
+            return tl::unexpected(read.error());
+        }
+    }
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        if (!given[i]) {
+            continue;
+        }
+        const Setting& setting = settings()[i];
+        if (const auto set = set_value(config, setting, flags.values[i]); !set) {
+            return fail(set.error().code, flag_of(setting) + ": " + set.error().message);
+        }
+    }
+    return config;
+}
+
+Result<Endpoint> endpoint_of(const char* flag, const std::string& text) {
+    const auto endpoint = parse_endpoint(text);
     if (!endpoint) {
-        return wrong_use("--tcp: " + endpoint.error().message);
+        return fail(endpoint.error().code, std::string(flag) + ": " + endpoint.error().message);
     }
-    const auto format = parse_log_format(arguments.log_format);
-    const auto level = parse_log_level(arguments.log_level);
-    if (!format || !level) {
-        return wrong_use(format ? level.error().message : format.error().message);
-    }
+    return endpoint;
+}
+
+/// All but the world.
+Result<ServerOptions> options_of(const ServerConfig& config) {
     ServerOptions options;
-    options.store = arguments.store == "memory" ? StoreKind::memory : StoreKind::rocksdb;
-    if (options.store == StoreKind::rocksdb && arguments.data.empty()) {
-        return wrong_use("--data DIR is needed: where chunks are kept (or use --store memory)");
+    const auto tcp = endpoint_of("--tcp", config.tcp);
+    if (!tcp) {
+        return tl::unexpected(tcp.error());
     }
-    options.world = open_world(arguments.world);
-    if (!options.world) {
-        return kExitWrongUse;
-    }
-    const std::size_t world_bytes = canonical_world_file(options.world->definition).size();
-    if (world_bytes > kWorldTextBytesMax) {
-        return wrong_use(arguments.world + ": " + std::to_string(world_bytes) +
-                         " bytes when written out in full; at most " +
-                         std::to_string(kWorldTextBytesMax) + " can be sent to clients");
-    }
-    if (arguments.http != "none") {
-        const auto http = parse_endpoint(arguments.http);
+    options.listen.endpoint = *tcp;
+    if (config.http != "none") {
+        const auto http = endpoint_of("--http", config.http);
         if (!http) {
-            return wrong_use("--http: " + http.error().message + "; or none");
+            return fail(http.error().code, http.error().message + "; or none");
         }
         options.http = *http;
     }
-    options.data_directory = arguments.data;
-    options.listen.endpoint = *endpoint;
-    options.workers = arguments.workers;
-    options.cache_bytes_max = arguments.cache_mib << 20U;
+    if (config.tls_cert.empty() != config.tls_key.empty()) {
+        return fail(ErrorCode::invalid_argument, "--tls-cert and --tls-key belong together");
+    }
+    if (!config.tls_cert.empty()) {
+        options.tls = {.certificate = config.tls_cert, .key = config.tls_key};
+    }
+    options.token_file = config.tokens;
+    if (config.anonymous != "auto") {
+        options.anonymous = config.anonymous == "yes";
+    }
+    if (options.anonymous == false && config.tokens.empty()) {
+        return fail(ErrorCode::invalid_argument,
+                    "--anonymous no needs --tokens FILE, or nobody could come in");
+    }
+    if (!config.viewer.empty()) {
+        auto files = read_viewer_files(config.viewer);
+        if (!files) {
+            return fail(files.error().code, "--viewer: " + files.error().message);
+        }
+        options.viewer_files = *std::move(files);
+    }
+    options.store = config.store == "memory" ? StoreKind::memory : StoreKind::rocksdb;
+    if (options.store == StoreKind::rocksdb && config.data.empty()) {
+        return fail(ErrorCode::invalid_argument,
+                    "--data DIR is needed: where chunks are kept (or use --store memory)");
+    }
+    options.data_directory = config.data;
+    options.publish_world = config.publish_world;
+    options.workers = config.workers;
+    options.cache_bytes_max = config.cache_mib << 20U;
+    options.stack_cache_bytes_max = config.stack_cache_mib << 20U;
+    options.listen.io_threads = config.io_threads;
+    options.listen.sessions_max = config.sessions_max;
+    options.listen.sessions_per_address_max = config.sessions_per_address_max;
+    const auto seconds = [](std::uint64_t count) {
+        return std::chrono::milliseconds(count * 1000);
+    };
+    options.timeouts.hello = seconds(config.header_timeout_s);
+    options.timeouts.stall = seconds(config.stall_timeout_s);
+    options.timeouts.idle = seconds(config.idle_timeout_s);
+    options.timeouts.ping = options.timeouts.idle / 2;
+    options.http_timeouts = {.header = options.timeouts.hello,
+                             .stall = options.timeouts.stall,
+                             .keep_alive = options.timeouts.idle};
+    return options;
+}
 
-    const StopSignals signals;  // before any thread starts
-    const Log log(*format, *level);
+int serve_until_told(const ServerConfig& config, const ServerOptions& options, LogFormat format,
+                     LogLevel level) {
+    const ServerSignals signals;  // before any thread starts
+    const Log log(format, level);
     log_start(log, options, raise_descriptor_limit());
     auto server = Server::start(options, log);
     if (!server) {
         std::fprintf(stderr, "terrane: %s\n", server.error().message.c_str());
         return kExitFailed;
     }
-    if (*format == LogFormat::json) {
+    if (format == LogFormat::json) {
         log.info("listening", {{"tcp", to_string((*server)->endpoint())},
                                {"world", options.world->definition.name},
                                {"fingerprint", to_hex(options.world->fingerprint)},
                                {"workers", std::uint64_t{options.workers}},
-                               {"store", arguments.store}});
+                               {"store", config.store}});
     }
     std::printf("listening on tcp %s: world \"%s\", fingerprint %s, %zu workers, %s store\n",
                 to_string((*server)->endpoint()).c_str(), options.world->definition.name.c_str(),
-                to_hex(options.world->fingerprint).c_str(), options.workers,
-                arguments.store.c_str());
+                to_hex(options.world->fingerprint).c_str(), options.workers, config.store.c_str());
     if (const auto http = (*server)->http_endpoint()) {
-        std::printf("listening on http %s: http://%s/\n", to_string(*http).c_str(),
-                    to_string(*http).c_str());
+        std::printf("listening on http %s: http%s://%s/\n", to_string(*http).c_str(),
+                    options.tls ? "s" : "", to_string(*http).c_str());
     }
     std::fflush(stdout);
-    const std::string signal = signals.wait();
+    const std::string signal = signals.wait([&] { (*server)->reload(); });
     log.info("draining; a second signal ends at once",
              {{"signal", signal}, {"sessions", std::uint64_t{(*server)->sessions()}}});
-    (*server)->stop();
+    (*server)->stop(std::chrono::seconds(config.drain_timeout_s));
     log.info("stopped", {{"generations", count_of((*server)->counters().generations)},
                          {"answers", count_of((*server)->counters().answers)},
                          {"cache_hits", count_of((*server)->counters().cache_hits)},
@@ -165,37 +243,78 @@ int run_serve(const ServeArguments& arguments) {
     return kExitDone;
 }
 
+int run_serve(const ServeFlags& flags, const std::vector<bool>& given) {
+    const auto config = config_of(flags, given);
+    if (!config) {
+        return wrong_use(config.error().message);
+    }
+    if (flags.print_config) {
+        std::fputs(config_toml(*config).c_str(), stdout);
+        return kExitDone;
+    }
+    const auto format = parse_log_format(config->log_format);
+    const auto level = parse_log_level(config->log_level);
+    if (!format || !level) {
+        return wrong_use(format ? level.error().message : format.error().message);
+    }
+    auto options = options_of(*config);
+    if (!options) {
+        return wrong_use(options.error().message);
+    }
+    const MemoryBound bound = memory_bound_of(*options);
+    if (config->memory_max_mib > 0 && mib(bound.sum()) >= config->memory_max_mib) {
+        return wrong_use("the memory bound is " + std::to_string(mib(bound.sum()) + 1) +
+                         " MiB, above --memory-max-mib " + std::to_string(config->memory_max_mib) +
+                         "; lower --cache-mib, --workers or --sessions-max (" +
+                         std::to_string(mib(bound.sessions)) + " MiB of it are sessions)");
+    }
+    if (config->world.empty()) {
+        return wrong_use("--world FILE is needed: what is to be served");
+    }
+    options->world = open_world(config->world);
+    if (!options->world) {
+        return kExitWrongUse;
+    }
+    const std::size_t world_bytes = canonical_world_file(options->world->definition).size();
+    if (world_bytes > kWorldTextBytesMax) {
+        return wrong_use(config->world + ": " + std::to_string(world_bytes) +
+                         " bytes when written out in full; at most " +
+                         std::to_string(kWorldTextBytesMax) + " can be sent to clients");
+    }
+    return serve_until_told(*config, *options, *format, *level);
+}
+
 }  // namespace
 
 void add_serve_command(CLI::App& app, int& exit_code) {
-    const auto arguments = std::make_shared<ServeArguments>();
+    const auto flags = std::make_shared<ServeFlags>();
     CLI::App* serve =
         app.add_subcommand("serve", "Make chunks of a world and send them to clients");
-    serve->add_option("--world", arguments->world, "World file")->required();
-    serve->add_option("--data", arguments->data, "Folder where chunks are kept; made if missing");
-    serve->add_option("--tcp", arguments->tcp, "Address and port; port 0 takes a free one")
-        ->capture_default_str();
-    serve
-        ->add_option("--http", arguments->http,
-                     "Address and port of HTTP and WebSocket; none turns them off")
-        ->capture_default_str();
-    serve->add_option("--workers", arguments->workers, "Threads that make chunks")
-        ->check(CLI::Range(std::size_t{1}, kWorkersMax))
-        ->capture_default_str();
-    serve->add_option("--cache-mib", arguments->cache_mib, "Memory for encoded chunks, MiB")
-        ->check(CLI::Range(std::size_t{1}, kCacheMibMax))
-        ->capture_default_str();
-    serve->add_option("--store", arguments->store, "rocksdb, or memory: nothing is kept")
-        ->check(CLI::IsMember({"rocksdb", "memory"}))
-        ->capture_default_str();
-    serve->add_option("--log-format", arguments->log_format, "text, or json: an object a line")
-        ->check(CLI::IsMember({"text", "json"}))
-        ->capture_default_str();
-    serve->add_option("--log-level", arguments->log_level, "debug, info, warning, error or off")
-        ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
-        ->capture_default_str();
-    serve->footer("Example: terrane serve --world generator/worlds/basin.toml --data /tmp/basin");
-    serve->callback([arguments, &exit_code] { exit_code = run_serve(*arguments); });
+    serve->add_option("--config", flags->config, "TOML file of settings; flags win over it");
+    serve->add_flag("--print-config", flags->print_config,
+                    "Print all settings as such a file, and do nothing else");
+    const ServerConfig defaults;
+    flags->values.resize(settings().size());
+    std::vector<CLI::Option*> options;
+    for (std::size_t i = 0; i < settings().size(); ++i) {
+        const Setting& setting = settings()[i];
+        options.push_back(
+            serve->add_option(flag_of(setting), flags->values[i], std::string(setting.help))
+                ->default_str(value_text(defaults, setting)));
+    }
+    serve->footer(
+        "SIGHUP reads certificate, key and tokens again. SIGTERM and SIGINT let clients finish.\n"
+        "Examples:\n"
+        "  terrane serve --world generator/worlds/basin.toml --data /tmp/basin\n"
+        "  terrane serve --print-config > server.toml; terrane serve --config server.toml");
+    serve->callback([flags, options, &exit_code] {
+        std::vector<bool> given;
+        given.reserve(options.size());
+        for (const CLI::Option* option : options) {
+            given.push_back(option->count() > 0);
+        }
+        exit_code = run_serve(*flags, given);
+    });
 }
 
 }  // namespace terrane

@@ -29,10 +29,11 @@ WireComposition wire_of(const Composition& composition) {
 
 }  // namespace
 
-Session::Session(const SessionContext& context, Post post, Clock::time_point now)
+Session::Session(const SessionContext& context, Post post, Clock::time_point now, std::string token)
     : context_(context),
       post_(std::move(post)),
       flow_(context.service->new_flow_id()),
+      token_(std::move(token)),
       caps_(clamped(context.caps)),
       byte_rate_(0, 0, now),
       request_rate_(request_rate_of(caps_, now)),
@@ -52,6 +53,11 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
     }
     reader_.feed(bytes);
     process(now);
+    if (stage_ == Stage::hello && reader_.buffered_bytes() > kHelloBytesMax) {
+        close_with(
+            {.code = ErrorCode::too_large,
+             .message = "a ClientHello has at most " + std::to_string(kHelloBytesMax) + " bytes"});
+    }
 }
 
 void Session::written(std::size_t size_bytes, Clock::time_point now) {
@@ -120,7 +126,9 @@ void Session::handle_one(const ClientHello& hello) {
         return;
     }
     if (context_.admit) {
-        const auto caps = context_.admit(hello);
+        ClientHello shown = hello;
+        shown.token = hello.token.empty() ? token_ : hello.token;
+        const auto caps = context_.admit(shown);
         if (!caps) {
             close_with(caps.error());
             return;
@@ -209,6 +217,11 @@ void Session::handle_one(const ColumnQuery& query) {
 
 void Session::handle_one(const WorldQuery& query) {
     if (!takes_request(query.request_id)) {
+        return;
+    }
+    if (context_.world_file.empty()) {
+        fail_request(query.request_id, {.code = ErrorCode::not_found,
+                                        .message = "this server does not publish its world file"});
         return;
     }
     send(WorldAnswer{.request_id = query.request_id,

@@ -44,6 +44,9 @@ inline constexpr std::int32_t kPriorityStep = 1 << 16;
 /// Answers out of the cache in one go; then the thread's other sessions have their turn.
 inline constexpr std::size_t kAnswersPerTurnMax = 64;
 
+/// What is kept of a client that has not said who it is; a hello has at most some 5 KiB.
+inline constexpr std::size_t kHelloBytesMax = std::size_t{8} << 10U;
+
 struct SessionTimeouts {
     std::chrono::milliseconds hello{10'000};  ///< connected, and no ClientHello yet
     std::chrono::milliseconds stall{30'000};  ///< a frame begun and not ended; a write that stands
@@ -70,8 +73,10 @@ class Session : public std::enable_shared_from_this<Session> {
     /// Runs a function on the session's thread, some time later; callable from any thread.
     using Post = std::function<void(std::function<void()>)>;
 
-    /// `context` outlives the session.
-    Session(const SessionContext& context, Post post, Clock::time_point now);
+    /// `context` outlives the session. `token`: shown to the transport already, and used where the
+    /// ClientHello has none.
+    Session(const SessionContext& context, Post post, Clock::time_point now,
+            std::string token = {});
 
     /// Bytes from the client. All of them are kept, so call it only while `wants_input`.
     void receive(std::span<const std::byte> bytes, Clock::time_point now);
@@ -178,6 +183,7 @@ class Session : public std::enable_shared_from_this<Session> {
     const SessionContext& context_;
     const Post post_;
     const FlowId flow_;
+    const std::string token_;  ///< shown before the hello
     SessionCaps caps_;
     Stage stage_ = Stage::hello;
     FrameReader reader_{kInboundFrameLimits};

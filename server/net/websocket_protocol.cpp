@@ -1,6 +1,7 @@
 #include "server/net/websocket_protocol.h"
 
 #include "protocol/base/check.h"
+#include "server/net/tokens.h"
 #include "server/net/websocket_frames.h"
 
 #include <algorithm>
@@ -155,6 +156,8 @@ class WebSocketProtocol final : public ByteProtocol {
 
     std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
 
+    std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
+
     void drain() override {
         draining_ = true;
         session_->drain();
@@ -304,7 +307,9 @@ WebSocketUpgrade websocket_upgrade(const SessionContext& context) {
             .make = [&context](const ReceivedRequest& request, Bytes rest, ConnectionPost post,
                                ByteProtocol::Clock::time_point now) {
                 auto protocol = std::make_shared<WebSocketProtocol>(
-                    std::make_shared<Session>(context, std::move(post), now),
+                    std::make_shared<Session>(
+                        context, std::move(post), now,
+                        token_of(request.request.authorization, request.request.query)),
                     websocket_handshake(request.websocket_key));
                 protocol->receive(rest, now);
                 return protocol;

@@ -194,7 +194,8 @@ int run_get(const GetOptions& options) {
                          .port = options.port,
                          .timeout = std::chrono::ceil<std::chrono::milliseconds>(deadline - begin),
                          .client_name = "terrane-client",
-                         .token = {}});
+                         .token = options.token,
+                         .tls = options.tls});
     if (!client) {
         complain(client.error().message);
         return kClientFailed;
@@ -277,6 +278,9 @@ Result<GetOptions> understood(const GetFlags& flags) {
         return fail(ErrorCode::invalid_argument,
                     "--obj: columns have no mesh; use --format draco or blocky");
     }
+    if (!options.tls.ca_file.empty() && !options.tls.enabled) {
+        return fail(ErrorCode::invalid_argument, "--ca: it needs --tls");
+    }
     // Not CLI::Range, which lets NaN pass.
     if (!(options.timeout_s >= kTimeoutMinS && options.timeout_s <= kTimeoutMaxS)) {
         return fail(ErrorCode::invalid_argument, "--timeout: 0.001 to 86400 seconds are possible");
@@ -300,6 +304,13 @@ void add_get_command(CLI::App& app, int& exit_code) {
     get->add_option("--server", flags->server, "Where the server listens")
         ->type_name("HOST:PORT")
         ->capture_default_str();
+    get->add_option("--token", flags->options.token, "Lets you in where a server asks for one")
+        ->envname("TERRANE_TOKEN");
+    get->add_flag("--tls", flags->options.tls.enabled,
+                  "Speak TLS, and check that the server's certificate is good for HOST");
+    get->add_option("--ca", flags->options.tls.ca_file,
+                    "PEM certificates to trust instead of the system's")
+        ->type_name("FILE");
     get->add_option(
            "--lod", flags->lod,
            "Level of detail, 0..17: every 2^L-th column; above 0 a chunk is its columns' whole "

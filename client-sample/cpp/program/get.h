@@ -17,6 +17,8 @@ namespace terrane {
 struct GetOptions {
     std::string host = "127.0.0.1";
     std::uint16_t port = kDefaultPort;
+    std::string token;
+    TlsUse tls;
     std::vector<ChunkPos> keys;  ///< each once
     ChunkFormat format = ChunkFormat::draco;
     std::filesystem::path output;  ///< empty: write nothing
