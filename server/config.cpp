@@ -2,6 +2,7 @@
 
 #include "server/chunks/worker_pool.h"
 #include "server/net/listener.h"
+#include "server/net/session_caps.h"
 #include "server/toml_settings.h"
 
 #include <algorithm>
@@ -128,6 +129,26 @@ std::vector<Setting> all_settings() {
          .member = &Config::sessions_per_address_max,
          .least = 1,
          .most = std::uint64_t{1} << 20U},
+        {.key = "view_radius_max",
+         .help = "Chunk sides around a viewer, at each level; 0: no views",
+         .member = &Config::view_radius_max,
+         .least = 0,
+         .most = kViewRadiusMax},
+        {.key = "credit_window_bytes",
+         .help = "Bytes of a view that may be sent and not read",
+         .member = &Config::credit_window_bytes,
+         .least = kCreditWindowBytesMin,
+         .most = kCreditWindowBytesMax},
+        {.key = "requests_per_second_max",
+         .help = "Requests of one session; 0: as many as it likes",
+         .member = &Config::requests_per_second_max,
+         .least = 0,
+         .most = std::uint64_t{1} << 20U},
+        {.key = "bytes_per_second_max",
+         .help = "Bytes to one session; 0: as many as it takes",
+         .member = &Config::bytes_per_second_max,
+         .least = 0,
+         .most = std::uint64_t{1} << 40U},
         {.key = "header_timeout_s",
          .help = "Seconds for a client's greeting, or a request's headers",
          .member = &Config::header_timeout_s,
@@ -164,7 +185,9 @@ std::vector<Setting> all_settings() {
 ServerConfig::ServerConfig()
     : workers(std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kWorkersMax)),
       sessions_max(kSessionsMax),
-      sessions_per_address_max(kSessionsPerAddressMax) {}
+      sessions_per_address_max(kSessionsPerAddressMax),
+      view_radius_max(kViewRadiusMax),
+      credit_window_bytes(kCreditWindowBytes) {}
 
 std::span<const Setting> settings() {
     static const std::vector<Setting> kSettings = all_settings();

@@ -35,6 +35,10 @@ struct ServerConfig {
     std::uint64_t memory_max_mib = 0;
     std::uint64_t sessions_max;
     std::uint64_t sessions_per_address_max;
+    std::uint64_t view_radius_max;
+    std::uint64_t credit_window_bytes;
+    std::uint64_t requests_per_second_max = 0;
+    std::uint64_t bytes_per_second_max = 0;
     std::uint64_t header_timeout_s = 10;
     std::uint64_t stall_timeout_s = 30;
     std::uint64_t idle_timeout_s = 60;

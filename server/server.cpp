@@ -243,6 +243,7 @@ struct Server::Impl {
           http{.router = &router,
                .counters = &http_counters,
                .next_request_id = &next_request_id,
+               .new_flow = [this] { return service.new_flow_id(); },
                .timeouts = options.http_timeouts,
                .websocket = websocket_upgrade(sessions),
                .requests_log = &log} {

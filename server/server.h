@@ -30,15 +30,15 @@ inline constexpr std::chrono::milliseconds kDrainTime{10'000};
 struct ServerOptions {
     std::shared_ptr<const World> world;
     ListenOptions listen;
-    std::optional<Endpoint> http;  ///< none: no HTTP and no WebSocket
+    std::optional<Endpoint> http = {};  ///< none: no HTTP and no WebSocket
     SessionTimeouts timeouts;
-    HttpTimeouts http_timeouts;
-    std::vector<ViewerFile> viewer_files;
-    SessionCaps caps;                     ///< of every session; clamped
-    bool publish_world = true;            ///< clients may have the world file
-    std::optional<TlsServer::Files> tls;  ///< of both ports
-    std::filesystem::path token_file;     ///< empty: none
-    std::optional<bool> anonymous;        ///< default: if there is no token file
+    HttpTimeouts http_timeouts = {};
+    std::vector<ViewerFile> viewer_files = {};
+    SessionCaps caps;                          ///< of every session; clamped
+    bool publish_world = true;                 ///< clients may have the world file
+    std::optional<TlsServer::Files> tls = {};  ///< of both ports
+    std::filesystem::path token_file = {};     ///< empty: none
+    std::optional<bool> anonymous = {};        ///< default: if there is no token file
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;

@@ -193,6 +193,11 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
     options.listen.io_threads = config.io_threads;
     options.listen.sessions_max = config.sessions_max;
     options.listen.sessions_per_address_max = config.sessions_per_address_max;
+    options.caps.view_radius_max = static_cast<std::uint32_t>(config.view_radius_max);
+    options.caps.credit_window_bytes = static_cast<std::uint32_t>(config.credit_window_bytes);
+    options.caps.requests_per_second_max =
+        static_cast<std::uint32_t>(config.requests_per_second_max);
+    options.caps.bytes_per_second_max = config.bytes_per_second_max;
     const auto seconds = [](std::uint64_t count) {
         return std::chrono::milliseconds(count * 1000);
     };

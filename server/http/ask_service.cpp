@@ -24,7 +24,9 @@ void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& r
     question->then = std::move(then);
     const auto outcome = service.request(
         key, priority,
-        {.id = id, .answer = [question](const Result<Answer>& result) { question->then(result); }});
+        {.id = id,
+         .answer = [question](const Result<Answer>& result) { question->then(result); },
+         .flow = request.flow});
     if (!outcome) {
         question->then(tl::unexpected(outcome.error()));
     } else if (*outcome) {

@@ -158,6 +158,7 @@ HttpSession::HttpSession(const HttpContext& context, ConnectionOrigin origin, Co
     : context_(context),
       origin_(std::move(origin)),
       post_(std::move(post)),
+      flow_(context.new_flow()),
       idle_since_(now),
       request_since_(now) {}
 
@@ -195,6 +196,7 @@ void HttpSession::process(Clock::time_point now) {
 void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
     context_.counters->requests.fetch_add(1, std::memory_order_relaxed);
     received.request.id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
+    received.request.flow = flow_;
     received.request.stop = stop_.get_token();
     pending_ = std::make_shared<Pending>();
     pending_->session = weak_from_this();

@@ -52,6 +52,7 @@ struct HttpContext {
     const Router* router = nullptr;
     HttpCounters* counters = nullptr;
     std::atomic<std::uint64_t>* next_request_id = nullptr;
+    std::function<std::uint64_t()> new_flow;  ///< of a connection, for the service
     HttpTimeouts timeouts;
     WebSocketUpgrade websocket;
     const Log* requests_log = nullptr;  ///< gets a line a request, if not null
@@ -98,6 +99,7 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     const HttpContext& context_;
     const ConnectionOrigin origin_;
     const ConnectionPost post_;
+    const std::uint64_t flow_;
     HttpReader reader_;
     Outbox outbox_;
     std::stop_source stop_;

@@ -32,7 +32,7 @@ struct ListenPort {
     std::string name;  ///< "tcp" or "http", for messages
     Endpoint endpoint;
     ProtocolFactory make;
-    Bytes refusal;             ///< written to a client for whom there is no room
+    Bytes refusal = {};        ///< written to a client for whom there is no room
     TlsServer* tls = nullptr;  ///< outlives the listener
 };
 
