@@ -40,11 +40,10 @@ ViewSet::ViewSet(const ViewUpdate& view, const ServerHello& world) {
             (is_x ? levels_[i].there.x : levels_[i].there.z) = there;
             if (i > 0 && radius(i - 1) > 0) {  // distance < radius of the level below
                 const double reach = radius(i - 1) / 2;
-                (is_x ? levels_[i].split.x : levels_[i].split.z) = {
-                    .first =
-                        std::max(there.first, static_cast<std::int64_t>(std::floor(at - reach))),
-                    .last =
-                        std::min(there.last, static_cast<std::int64_t>(std::ceil(at + reach)) - 1)};
+                Span& split = is_x ? levels_[i].split.x : levels_[i].split.z;
+                const auto first = static_cast<std::int64_t>(std::floor(at - reach));
+                const auto last = static_cast<std::int64_t>(std::ceil(at + reach)) - 1;
+                split = {.first = std::max(there.first, first), .last = std::min(there.last, last)};
             }
         }
     }

@@ -137,7 +137,7 @@ TEST_P(ColumnMapTest, MeshesWhatTheServerMeshes) {
         EXPECT_EQ(triangles_of(*mesh), triangles_of(expected)) << "at y " << y;
         triangles += mesh->triangle_count();
     }
-    EXPECT_GT(triangles, 1000U);
+    EXPECT_GT(triangles, 100U);
 }
 
 TEST_P(ColumnMapTest, MeshesTheTilesOfLevelsToo) {
@@ -169,8 +169,9 @@ TEST_P(ColumnMapTest, TakesFinerColumnsAtTheRimOfALevel) {
 TEST_P(ColumnMapTest, GivesColumnsAndVoxelsOfTheWholeStack) {
     const StackPos position{.lod = 0, .x = 3, .z = -4};
     put(position);
-    for (const ColumnPos local : {ColumnPos{.x = 0, .z = 0}, ColumnPos{.x = 7, .z = 13},
-                                  ColumnPos{.x = side() - 1, .z = side() - 1}}) {
+    for (const ColumnPos local :
+         {ColumnPos{.x = 0, .z = 0}, ColumnPos{.x = side() / 2, .z = side() / 3},
+          ColumnPos{.x = side() - 1, .z = side() - 1}}) {
         const ColumnPos place{.x = 3 * side() + local.x, .z = -4 * side() + local.z};
         const auto limits = stack(position).columns.column(static_cast<std::int32_t>(local.x),
                                                            static_cast<std::int32_t>(local.z));

@@ -1,5 +1,6 @@
 #include "client-sample/cpp/program/program.h"
 
+#include "client-sample/cpp/program/load.h"
 #include "protocol/base/command_line.h"
 
 #include <CLI/CLI.hpp>
@@ -22,7 +23,8 @@ std::vector<std::string> joined_arguments(int argc, const char* const* argv) {
         const bool is_negative =
             argument.size() > 1 && argument[0] == '-' && argument[1] >= '0' && argument[1] <= '9';
         if (is_negative && !arguments.empty() &&
-            (arguments.back() == "--at" || arguments.back() == "--lod")) {
+            (arguments.back() == "--at" || arguments.back() == "--lod" ||
+             arguments.back() == "--eye" || arguments.back() == "--look")) {
             arguments.back() += "=" + argument;
         } else {
             arguments.push_back(argument);
@@ -42,6 +44,7 @@ int run_client_program(int argc, const char* const* argv) {
         app.set_version_flag("--version", TERRANE_VERSION);
         app.footer("Try: terrane-client get --help");
         add_get_command(app, exit_code);
+        add_load_command(app, exit_code);
         auto arguments = joined_arguments(argc, argv);
         if (const auto slip = unknown_subcommand(app, arguments)) {
             std::fprintf(stderr, "terrane-client: %s\n", slip->c_str());

@@ -1,0 +1,55 @@
+// How the native protocol's messages travel on a byte stream: as they are (TCP), or in a WebSocket.
+// No socket here: bytes in, bytes out, so that one loop carries all of them and tests step each.
+#pragma once
+
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace terrane {
+
+enum class CarrierKind : std::uint8_t { tcp, web_socket };
+
+/// A message and what followed it; the payload lives until the carrier's next call.
+struct CarriedMessage {
+    AnyMessage message;
+    std::span<const std::byte> payload;
+};
+
+/// One connection's, from its first byte on. One thread.
+class Carrier {
+  public:
+    virtual ~Carrier() = default;
+
+    /// What must be sent before any message; empty if nothing.
+    virtual Bytes opening() = 0;
+
+    /// The message as bytes for the connection. Before the peer has accepted the opening they may
+    /// be sent behind it all the same: no carrier here waits.
+    virtual Bytes wrap(const AnyMessage& message) = 0;
+
+    /// Takes what the connection brought. Fails if the peer refuses or breaks the carrier's rules.
+    virtual Result<void> feed(std::span<const std::byte> bytes) = 0;
+
+    /// The next whole message; nothing if more bytes are needed.
+    virtual Result<std::optional<CarriedMessage>> next() = 0;
+
+    /// What the carrier itself wants to say, a pong for instance; empty if nothing.
+    virtual Bytes take_reply() { return {}; }
+};
+
+struct CarrierAddress {
+    std::string host;
+    std::uint16_t port = 0;
+    std::uint64_t seed = 0;  ///< of a WebSocket's key and masks, which need not be secret here
+};
+
+std::unique_ptr<Carrier> make_carrier(CarrierKind kind, const CarrierAddress& address);
+
+}  // namespace terrane

@@ -1,0 +1,208 @@
+#include "client-sample/cpp/program/stream_loop.h"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
+
+#include <array>
+#include <deque>
+#include <utility>
+#include <vector>
+
+namespace terrane {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+namespace {
+
+constexpr std::size_t kReceiveBytes = std::size_t{64} << 10U;
+
+/// A connection; kept alive by the operations that are under way.
+struct Stream {
+    explicit Stream(asio::io_context& context) : socket(context) {}
+
+    tcp::socket socket;
+    bool is_open = false;
+    bool is_ended = false;
+    bool is_writing = false;
+    std::deque<Bytes> queue;
+    std::size_t queued_bytes = 0;
+};
+
+}  // namespace
+
+struct StreamLoop::State {
+    asio::io_context context{1};
+    std::vector<tcp::endpoint> endpoints;
+    std::string peer;
+    Handlers handlers;
+    std::vector<std::shared_ptr<Stream>> streams;
+    /// One for all: bytes are handed on before the next read.
+    std::array<std::byte, kReceiveBytes> received{};
+
+    void end(StreamId id, const std::string& why) {
+        Stream& stream = *streams[id];
+        if (stream.is_ended) {
+            return;
+        }
+        shut(stream);
+        handlers.closed(id, Error{.code = ErrorCode::io_error, .message = peer + ": " + why});
+    }
+
+    static void shut(Stream& stream) {
+        stream.is_ended = true;
+        stream.is_open = false;
+        error_code ignored;
+        stream.socket.close(ignored);
+    }
+
+    void read(StreamId id) {
+        // Waiting takes no buffer, so thousands of idle connections hold none.
+        streams[id]->socket.async_wait(
+            tcp::socket::wait_read, [this, id, stream = streams[id]](error_code error) {
+                if (stream->is_ended) {
+                    return;
+                }
+                std::size_t size_bytes = 0;
+                if (!error) {
+                    size_bytes = stream->socket.read_some(asio::buffer(received), error);
+                }
+                if (error == asio::error::would_block || error == asio::error::try_again) {
+                    read(id);
+                    return;
+                }
+                if (error) {
+                    end(id, error == asio::error::eof ? "the server closed the connection"
+                                                      : error.message());
+                    return;
+                }
+                handlers.received(id, std::span<const std::byte>(received).first(size_bytes));
+                if (!stream->is_ended) {
+                    read(id);
+                }
+            });
+    }
+
+    void write(StreamId id) {
+        const auto& stream = streams[id];
+        if (stream->is_writing || !stream->is_open || stream->queue.empty()) {
+            return;
+        }
+        stream->is_writing = true;
+        const Bytes& front = stream->queue.front();
+        asio::async_write(stream->socket, asio::buffer(front.data(), front.size()),
+                          [this, id, stream](error_code error, std::size_t) {
+                              stream->is_writing = false;
+                              stream->queued_bytes -= stream->queue.front().size();
+                              stream->queue.pop_front();
+                              if (stream->is_ended) {
+                                  return;
+                              }
+                              if (error) {
+                                  end(id, error.message());
+                                  return;
+                              }
+                              write(id);
+                          });
+    }
+};
+
+StreamLoop::StreamLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+StreamLoop::StreamLoop(StreamLoop&&) noexcept = default;
+StreamLoop& StreamLoop::operator=(StreamLoop&&) noexcept = default;
+StreamLoop::~StreamLoop() = default;
+
+Result<StreamLoop> StreamLoop::open(const std::string& host, std::uint16_t port, Handlers handlers,
+                                    Deadline deadline) {
+    auto state = std::make_unique<State>();
+    state->peer = host + ":" + std::to_string(port);
+    state->handlers = std::move(handlers);
+    tcp::resolver resolver(state->context);
+    error_code outcome;
+    bool is_resolved = false;
+    resolver.async_resolve(host, std::to_string(port), [&](error_code error, const auto& results) {
+        outcome = error;
+        is_resolved = true;
+        for (const auto& result : results) {
+            state->endpoints.push_back(result.endpoint());
+        }
+    });
+    state->context.run_until(deadline);
+    if (!is_resolved || outcome) {
+        resolver.cancel();
+        state->context.restart();
+        state->context.run();
+        return fail(ErrorCode::io_error,
+                    state->peer + ": " + (outcome ? outcome.message() : "no address in time"));
+    }
+    return StreamLoop(std::move(state));
+}
+
+StreamLoop::StreamId StreamLoop::connect() {
+    State& state = *state_;
+    const StreamId id = state.streams.size();
+    const auto& stream = state.streams.emplace_back(std::make_shared<Stream>(state.context));
+    asio::async_connect(stream->socket, state.endpoints,
+                        [&state, id, stream](error_code error, const tcp::endpoint&) {
+                            if (stream->is_ended) {
+                                return;
+                            }
+                            if (!error) {
+                                stream->socket.set_option(tcp::no_delay(true), error);
+                                stream->socket.non_blocking(true, error);
+                            }
+                            if (error) {
+                                state.end(id, error.message());
+                                return;
+                            }
+                            stream->is_open = true;
+                            state.handlers.opened(id);
+                            if (!stream->is_ended) {
+                                state.read(id);
+                                state.write(id);
+                            }
+                        });
+    return id;
+}
+
+void StreamLoop::send(StreamId id, Bytes bytes) {
+    Stream& stream = *state_->streams[id];
+    if (stream.is_ended || bytes.empty()) {
+        return;
+    }
+    stream.queued_bytes += bytes.size();
+    if (stream.queued_bytes > kSendQueueBytesMax) {
+        state_->end(id, "the server does not take what is sent to it");
+        return;
+    }
+    stream.queue.push_back(std::move(bytes));
+    state_->write(id);
+}
+
+void StreamLoop::close(StreamId id) {
+    Stream& stream = *state_->streams[id];
+    if (!stream.is_ended) {
+        // A goodbye at the end of the queue goes out if nothing is before it.
+        if (stream.is_open && !stream.is_writing) {
+            error_code ignored;
+            for (const Bytes& bytes : stream.queue) {
+                stream.socket.write_some(asio::buffer(bytes.data(), bytes.size()), ignored);
+            }
+        }
+        State::shut(stream);
+    }
+}
+
+void StreamLoop::run_until(Deadline deadline) {
+    if (state_->context.stopped()) {
+        state_->context.restart();
+    }
+    state_->context.run_until(deadline);
+}
+
+}  // namespace terrane
