@@ -14,6 +14,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <exception>
 #include <string>
 #include <utility>
@@ -26,8 +27,9 @@ constexpr const char* kServerVersion = "0.1.0";
 /// A worker's generator, mesher and encoder; the largest allowed stack (64 x 64 columns of a few
 /// hundred limits) takes about a third of it.
 constexpr std::size_t kWorkerScratchBytes = std::size_t{32} << 20U;
-/// A session's own objects and read buffer, without outbox and frame.
-constexpr std::size_t kSessionBytes = std::size_t{8} << 10U;
+/// The one answer that an outbox may hold beyond its bound: a chunk, or the world file. Of a
+/// chunk's payload, bytes a column: eight times what the demo world's fullest chunk takes.
+constexpr std::size_t kPayloadBytesPerColumn = 64;
 /// An entry of the in-flight table with its key, and a waiter with its callback; measured by sizeof
 /// and the nodes around them.
 constexpr std::size_t kKeyInFlightBytes = 400;
@@ -58,10 +60,7 @@ ServerHello hello_of(const World& world) {
                       .levels = levels_supported(),
                       .height_bound_voxels = world.stack.height_bound,
                       .materials = {},
-                      .limits = {.keys_per_request_max = kKeysPerRequestMax,
-                                 .keys_in_flight_max = kKeysInFlightPerSessionMax,
-                                 .inbound_frame_bytes_max = kInboundFrameBytesMax,
-                                 .payload_bytes_max = kPayloadBytesMax}};
+                      .limits = {}};  // every session tells its own
     for (const Material& material : definition.materials) {
         const Rgb8 color = material.color;
         hello.materials.push_back(
@@ -91,9 +90,18 @@ Bytes http_refusal() {
     return out;
 }
 
+std::size_t answer_bytes_of(const World& world) {
+    const auto side = static_cast<std::size_t>(world.definition.grid.side);
+    return std::max(side * side * kPayloadBytesPerColumn,
+                    canonical_world_file(world.definition).size());
+}
+
 }  // namespace
 
 MemoryBound memory_bound_of(const ServerOptions& options) {
+    const std::size_t answer_bytes = options.world ? answer_bytes_of(*options.world) : 0;
+    const std::size_t session_bytes =
+        kOutboxBytesMax + answer_bytes + session_bytes_max(clamped(options.caps));
     const ServiceOptions service;
     const RocksdbOptions rocksdb;
     return {.caches = options.cache_bytes_max + options.stack_cache_bytes_max,
@@ -101,8 +109,7 @@ MemoryBound memory_bound_of(const ServerOptions& options) {
                          ? kMemoryStoreBytesMax
                          : rocksdb.block_cache_bytes + rocksdb.write_buffer_bytes,
             .workers = options.workers * kWorkerScratchBytes,
-            .sessions = options.listen.sessions_max *
-                        (kOutboxBytesMax + kInboundFrameBytesMax + kSessionBytes),
+            .sessions = options.listen.sessions_max * session_bytes,
             .queue = service.keys_in_flight_max * kKeyInFlightBytes +
                      service.waiters_max * kWaiterBytes};
 }
@@ -153,7 +160,8 @@ struct Server::Impl {
           sessions{.service = &service,
                    .hello = hello_of(*world),
                    .world_file = canonical_world_file(world->definition),
-                   .timeouts = options.timeouts},
+                   .timeouts = options.timeouts,
+                   .caps = options.caps},
           routes{.service = &service,
                  .world = world.get(),
                  .hello = &sessions.hello,

@@ -32,6 +32,7 @@ struct ServerOptions {
     SessionTimeouts timeouts;
     HttpTimeouts http_timeouts;
     std::vector<ViewerFile> viewer_files;
+    SessionCaps caps;  ///< of every session; clamped
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;
@@ -44,7 +45,8 @@ struct MemoryBound {
     std::size_t caches = 0;    ///< encoded chunks and stacks
     std::size_t store = 0;     ///< the memory store, or RocksDB's cache and write buffers
     std::size_t workers = 0;   ///< their scratch buffers
-    std::size_t sessions = 0;  ///< every session with a full outbox and a frame half read
+    std::size_t sessions = 0;  ///< every session with a full outbox and one answer more, a frame
+                               ///< half read, all the wishes it may have and the largest view
     std::size_t queue = 0;     ///< work that waits, and who waits for it
 
     std::size_t sum() const { return caches + store + workers + sessions + queue; }

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -34,8 +35,13 @@ class ByteProtocol {
     virtual std::size_t gather(Outbox::Gather& out) = 0;
     /// The first `size_bytes` of what waits have been written.
     virtual void written(std::size_t size_bytes, Clock::time_point now) = 0;
-    /// Looks at the deadlines; about once a second.
+    /// Looks at the deadlines; about once a second, and at `wake_at`.
     virtual void tick(Clock::time_point now) = 0;
+
+    /// When it will have something to send that it holds back now; nothing if only events are
+    /// waited for.
+    virtual std::optional<Clock::time_point> wake_at() const { return std::nullopt; }
+
     /// Takes nothing new, answers what is under way, then closes.
     virtual void drain() = 0;
     /// The connection is gone: cancels what it waits for. Only the destructor may follow.

@@ -77,7 +77,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
           socket_(std::move(socket)),
           origin_{.id = shared.next_id.fetch_add(1, std::memory_order_relaxed),
                   .address = std::move(address)},
-          connected_(Clock::now()) {}
+          connected_(Clock::now()),
+          wake_(loop.context) {}
 
     /// Already admitted under its address.
     void start() {
@@ -128,6 +129,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
         }
         error_code ignored;
         socket_.close(ignored);
+        wake_.cancel();
         if (protocol_) {
             protocol_->end();
         }
@@ -201,6 +203,26 @@ class Connection : public std::enable_shared_from_this<Connection> {
         }
         if (!reading_ && (linger_until_ || protocol_->wants_input() || is_shaking_hands())) {
             read();
+        }
+        wake_later();
+    }
+
+    /// What holds back something that it could send is asked again at the time it names.
+    void wake_later() {
+        const auto at = socket_.is_open() ? protocol_->wake_at() : std::nullopt;
+        if (at == wake_at_) {
+            return;
+        }
+        wake_at_ = at;
+        wake_.cancel();
+        if (at) {
+            wake_.expires_at(*at);
+            wake_.async_wait([self = shared_from_this()](error_code stopped) {
+                if (!stopped && self->socket_.is_open()) {
+                    self->wake_at_.reset();
+                    self->tick(Clock::now());
+                }
+            });
         }
     }
 
@@ -407,7 +429,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     bool reading_ = false;
     bool writing_ = false;
     std::optional<Clock::time_point> linger_until_;
-    std::string reason_;  ///< why we close, if the protocol doesn't know
+    asio::steady_timer wake_;
+    std::optional<Clock::time_point> wake_at_;  ///< what `wake_` is set to
+    std::string reason_;                        ///< why we close, if the protocol doesn't know
 };
 
 /// Tells a client that there is no room, and then reads what it sends until it closes or kLinger is

@@ -25,6 +25,8 @@ class NativeProtocol final : public ByteProtocol {
 
     void tick(Clock::time_point now) override { session_->tick(now); }
 
+    std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
+
     void drain() override { session_->drain(); }
 
     void end() override { session_->end(); }

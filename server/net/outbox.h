@@ -3,13 +3,17 @@
 //
 // The owner looks at `full()` before it makes more: at kOutboxBytesMax a session takes no new
 // answers and reads no more requests until the client has read some. One answer may go beyond.
+// Chunks of a view can be withdrawn as long as no write has them in hand.
 #pragma once
 
 #include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
 
 #include <array>
 #include <cstddef>
 #include <deque>
+#include <functional>
+#include <optional>
 #include <span>
 
 namespace terrane {
@@ -24,13 +28,22 @@ class Outbox {
   public:
     using Gather = std::array<std::span<const std::byte>, kGatherPartsMax>;
 
-    /// `payload` may be null.
-    void push(Bytes head, SharedBytes payload);
+    /// `payload` may be null. `of_view`: the chunk that it is, if it may be withdrawn.
+    void push(Bytes head, SharedBytes payload, std::optional<ChunkPos> of_view = std::nullopt);
     /// Fills `out` with the first parts in order and gives how many. They stay valid until
     /// `consume`.
     std::size_t gather(Gather& out) const;
     /// The first `size_bytes` have been written.
     void consume(std::size_t size_bytes);
+
+    struct Withdrawn {
+        std::size_t bytes = 0;
+        std::size_t payload_bytes = 0;
+    };
+
+    /// Takes out the chunks of the view that nobody wants any more, but for those that the last
+    /// `gather` has given out.
+    Withdrawn withdraw(const std::function<bool(ChunkPos)>& is_unwanted);
 
     bool empty() const { return parts_.empty(); }
 
@@ -43,6 +56,7 @@ class Outbox {
     struct Part {
         Bytes head;  ///< empty if the part is a payload
         SharedBytes payload;
+        std::optional<ChunkPos> of_view;  ///< of a head
 
         std::span<const std::byte> bytes() const {
             return payload ? std::span<const std::byte>(*payload)
@@ -53,6 +67,7 @@ class Outbox {
     std::deque<Part> parts_;
     std::size_t bytes_ = 0;
     std::size_t written_of_first_ = 0;
+    mutable std::size_t gathered_ = 0;  ///< parts that a writer holds
 };
 
 }  // namespace terrane

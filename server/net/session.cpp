@@ -14,6 +14,11 @@ namespace {
 /// Bytes of a Chunk's head, which the answers under way will need beside their payloads.
 constexpr std::size_t kHeadBytes = 128;
 
+TokenBucket request_rate_of(const SessionCaps& caps, Session::Clock::time_point now) {
+    return {static_cast<double>(caps.requests_per_second_max),
+            static_cast<double>(caps.requests_per_second_max), now};
+}
+
 WireComposition wire_of(const Composition& composition) {
     WireComposition out;
     for (const Share& share : composition.shares()) {
@@ -27,11 +32,19 @@ WireComposition wire_of(const Composition& composition) {
 Session::Session(const SessionContext& context, Post post, Clock::time_point now)
     : context_(context),
       post_(std::move(post)),
+      flow_(context.service->new_flow_id()),
+      caps_(clamped(context.caps)),
+      byte_rate_(0, 0, now),
+      request_rate_(request_rate_of(caps_, now)),
+      now_(now),
       connected_(now),
       last_sign_(now),
-      last_frame_(now) {}
+      last_frame_(now) {
+    set_rate();
+}
 
 void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
+    now_ = now;
     last_sign_ = now;
     ping_sent_.reset();
     if (reader_.buffered_bytes() == 0) {
@@ -42,6 +55,7 @@ void Session::receive(std::span<const std::byte> bytes, Clock::time_point now) {
 }
 
 void Session::written(std::size_t size_bytes, Clock::time_point now) {
+    now_ = now;
     write_waits_since_.reset();
     const bool wanted_input = wants_input();
     outbox_.consume(size_bytes);
@@ -59,7 +73,8 @@ void Session::written(std::size_t size_bytes, Clock::time_point now) {
 }
 
 bool Session::wants_input() const {
-    return (stage_ == Stage::hello || stage_ == Stage::open) && !outbox_.full();
+    return (stage_ == Stage::hello || stage_ == Stage::open) && !outbox_.full() &&
+           !(view_ && view_->has_forgotten());
 }
 
 void Session::process(Clock::time_point now) {
@@ -104,18 +119,50 @@ void Session::handle_one(const ClientHello& hello) {
                                ": this server speaks " + std::to_string(kProtocolVersion)});
         return;
     }
+    if (context_.admit) {
+        const auto caps = context_.admit(hello);
+        if (!caps) {
+            close_with(caps.error());
+            return;
+        }
+        caps_ = clamped(*caps);
+        request_rate_ = request_rate_of(caps_, now_);
+        set_rate();
+    }
     stage_ = Stage::open;
-    send(context_.hello);
+    ServerHello answer = context_.hello;
+    answer.limits = limits_of(caps_);
+    send(answer);
+}
+
+/// Counts it against the client's rate; if that is used up, says so.
+bool Session::takes_request(std::uint32_t request_id) {
+    request_rate_.refill(now_);
+    if (request_rate_.has(1 - 1e-9)) {
+        request_rate_.take(1);
+        return true;
+    }
+    const double wait_ms = 1000.0 / caps_.requests_per_second_max;
+    send(Failure{.request_id = request_id,
+                 .error = {.code = ErrorCode::busy,
+                           .message = std::to_string(caps_.requests_per_second_max) +
+                                      " requests a second are the most for this session"},
+                 .retry_after_ms = static_cast<std::uint32_t>(wait_ms) + 1,
+                 .key = std::nullopt});
+    return false;
 }
 
 void Session::handle_one(const ChunkRequest& request) {
+    if (!takes_request(request.request_id)) {
+        return;
+    }
     for (std::size_t i = 0; i < request.keys.size(); ++i) {
         add({.request_id = request.request_id,
              .key = ChunkKey{.position = request.keys[i],
                              .format = request.format,
                              .without_flow = request.without_flow},
              .known_etag = request.known_etags.empty() ? Hash128{} : request.known_etags[i],
-             .priority = std::clamp(request.priority, kPriorityMin, kPriorityMax),
+             .priority = std::clamp(request.priority, kPriorityMin, kPriorityMax) * kPriorityStep,
              .rank = {}});
     }
     submit();
@@ -149,6 +196,9 @@ void Session::handle_one(const ChunkCancel& cancel) {
 }
 
 void Session::handle_one(const ColumnQuery& query) {
+    if (!takes_request(query.request_id)) {
+        return;
+    }
     add({.request_id = query.request_id,
          .key = query.column,
          .known_etag = {},
@@ -158,6 +208,9 @@ void Session::handle_one(const ColumnQuery& query) {
 }
 
 void Session::handle_one(const WorldQuery& query) {
+    if (!takes_request(query.request_id)) {
+        return;
+    }
     send(WorldAnswer{.request_id = query.request_id,
                      .toml = context_.world_file,
                      .fingerprint = context_.hello.fingerprint});
@@ -180,9 +233,9 @@ void Session::handle_one(const Other& other) {
 }
 
 void Session::add(Wish wish) {
-    if (waiting_.size() + under_way_.size() >= kKeysInFlightPerSessionMax) {
+    if (waiting_.size() + under_way_.size() - view_under_way_ >= caps_.keys_in_flight_max) {
         fail_wish(wish, {.code = ErrorCode::busy,
-                         .message = std::to_string(kKeysInFlightPerSessionMax) +
+                         .message = std::to_string(caps_.keys_in_flight_max) +
                                     " keys of this session are in flight, which is the most"});
         return;
     }
@@ -192,40 +245,90 @@ void Session::add(Wish wish) {
 }
 
 bool Session::has_room() const {
+    const std::size_t expected = (under_way_.size() + 1) * (expected_bytes_ + kHeadBytes);
+    if (!byte_rate_.has(under_way_.empty() ? 0 : static_cast<double>(expected))) {
+        return false;
+    }
     if (under_way_.empty()) {
         return !outbox_.full();
     }
-    const std::size_t expected = (under_way_.size() + 1) * (expected_bytes_ + kHeadBytes);
-    return under_way_.size() < kWishesUnderWayMax && outbox_.bytes() + expected <= kOutboxBytesMax;
+    return under_way_.size() < caps_.wishes_under_way_max &&
+           outbox_.bytes() + expected <= kOutboxBytesMax;
 }
 
+/// Hands wishes on, the most urgent first, as long as there is room for their answers.
 void Session::submit() {
     if (stage_ != Stage::open && stage_ != Stage::finishing) {
         return;
     }
-    while (!waiting_.empty() && has_room()) {
-        Wish wish = std::move(waiting_.begin()->second);
-        waiting_.erase(waiting_.begin());
-        const WaiterId id = context_.service->new_waiter_id();
-        AnswerCallback callback = [post = post_, weak = weak_from_this(),
-                                   id](const Result<Answer>& result) {
-            post([weak, id, result] {
-                if (const auto self = weak.lock()) {
-                    self->deliver(id, result);
-                }
-            });
-        };
-        const auto outcome = context_.service->request(wish.key, wish.priority,
-                                                       {.id = id, .answer = std::move(callback)});
-        if (!outcome) {
-            fail_wish(wish, outcome.error());
-        } else if (*outcome) {
-            answer(wish, **outcome);
-        } else {
-            under_way_.emplace(id, std::move(wish));
+    byte_rate_.refill(now_);
+    wake_at_.reset();
+    view_waits_ = false;
+    tell_forgotten();
+    std::size_t answered = 0;
+    while (has_room()) {
+        const bool is_of_view = view_is_next();
+        if (!is_of_view && waiting_.empty()) {
+            break;
         }
+        if (answered == kAnswersPerTurnMax) {
+            go_on_later();
+            break;
+        }
+        answered += (is_of_view ? submit_of_view() : submit_request()) ? 1U : 0U;
+    }
+    const bool view_wishes = view_ && view_->has_wish();
+    if (!byte_rate_.has() && (view_wishes || !waiting_.empty())) {
+        wake_at_ = byte_rate_.ready_at();
+    } else if (view_wishes && view_retry_at_ && *view_retry_at_ > now_) {
+        wake_at_ = view_retry_at_;
     }
     finish_if_done();
+}
+
+void Session::go_on_later() {
+    if (!goes_on_later_) {
+        goes_on_later_ = true;
+        post_([weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->goes_on_later_ = false;
+                self->submit();
+            }
+        });
+    }
+}
+
+/// The answer if it is at hand; nothing if it is under way now.
+Result<std::optional<Answer>> Session::ask(Wish wish) {
+    const WaiterId id = context_.service->new_waiter_id();
+    AnswerCallback callback = [post = post_, weak = weak_from_this(),
+                               id](const Result<Answer>& result) {
+        post([weak, id, result] {
+            if (const auto self = weak.lock()) {
+                self->deliver(id, result);
+            }
+        });
+    };
+    auto outcome = context_.service->request(
+        wish.key, wish.priority, {.id = id, .answer = std::move(callback), .flow = flow_});
+    if (outcome && !*outcome) {
+        view_under_way_ += wish.is_of_view() ? 1U : 0U;
+        under_way_.emplace(id, std::move(wish));
+    }
+    return outcome;
+}
+
+/// True if it was answered at once.
+bool Session::submit_request() {
+    const Wish wish = std::move(waiting_.begin()->second);
+    waiting_.erase(waiting_.begin());
+    const auto outcome = ask(wish);
+    if (!outcome) {
+        fail_wish(wish, outcome.error());
+    } else if (*outcome) {
+        answer(wish, **outcome);
+    }
+    return !outcome || *outcome;
 }
 
 void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
@@ -235,6 +338,12 @@ void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
     }
     Wish wish = std::move(found->second);
     under_way_.erase(found);
+    if (wish.is_of_view()) {
+        --view_under_way_;
+        answer_of_view(wish, result);
+        submit();
+        return;
+    }
     if (result && outbox_.full() && std::holds_alternative<ServedChunk>(*result)) {
         waiting_.emplace(wish.rank, std::move(wish));
         return;
@@ -275,7 +384,8 @@ void Session::answer_chunk(const Wish& wish, const ServedChunk& served) {
     }
     // An exponential mean over about eight answers.
     expected_bytes_ = (expected_bytes_ * 7 + chunk.payload_bytes()) / 8;
-    send(head, chunk.payload);
+    send(head, chunk.payload,
+         wish.is_of_view() ? std::optional(served.key.position) : std::nullopt);
 }
 
 void Session::answer_column(const Wish& wish, const ServedColumn& column) {
@@ -318,14 +428,19 @@ void Session::close_with(Error error) {
     stage_ = Stage::closing;
 }
 
-void Session::send(const AnyMessage& message, SharedBytes payload) {
+void Session::send(const AnyMessage& message, SharedBytes payload,
+                   std::optional<ChunkPos> of_view) {
     if (stage_ != Stage::closing && stage_ != Stage::dead) {
         only_ping_waits_ = only_ping_waits_ && outbox_.empty();
-        outbox_.push(encode_message(message), std::move(payload));
+        const std::size_t before_bytes = outbox_.bytes();
+        outbox_.push(encode_message(message), std::move(payload), of_view);
+        byte_rate_.take(static_cast<double>(outbox_.bytes() - before_bytes));
     }
 }
 
 void Session::tick(Clock::time_point now) {
+    now_ = now;
+    submit();
     const SessionTimeouts& limits = context_.timeouts;
     if (outbox_.empty()) {
         write_waits_since_.reset();
@@ -358,9 +473,10 @@ void Session::tick(Clock::time_point now) {
 void Session::drain() {
     if (stage_ == Stage::hello || stage_ == Stage::open) {
         close_reason_ = "the server is shutting down";
+        end_view();
         send(Goodbye{.code = ErrorCode::draining, .reason = close_reason_});
         stage_ = Stage::finishing;
-        finish_if_done();
+        submit();
     }
 }
 
@@ -376,6 +492,8 @@ void Session::end() {
     }
     under_way_.clear();
     waiting_.clear();
+    view_under_way_ = 0;
+    view_.reset();
     stage_ = Stage::dead;
 }
 

@@ -4,16 +4,22 @@
 //     hello ──ClientHello──> open ──drain──> finishing ──last answer──> closing ──> dead
 //       └──── malformed, too late, wrong version ─────────────────────────┘
 //
-// Wishes (keys and columns) wait in the session, most urgent first. They go to the service only
-// while the outbox, with the answers expected for what is under way, has room: a client that
-// doesn't read makes no work and holds little memory. Answers come back through `post` on the
-// session's own thread.
+// Wishes (keys and columns) wait in the session, most urgent first, and beside them the wishes of
+// the client's view (view.h). They go to the service only while the outbox, with the answers
+// expected for what is under way, has room, and those of the view only while there is credit for
+// them: a client that doesn't read makes no work and holds little memory. Answers come back through
+// `post` on the session's own thread.
+//
+// The view's part of the session is in session_view.cpp.
 #pragma once
 
 #include "protocol/wire/frame.h"
 #include "protocol/wire/messages.h"
 #include "server/chunks/chunk_service.h"
 #include "server/net/outbox.h"
+#include "server/net/session_caps.h"
+#include "server/net/token_bucket.h"
+#include "server/net/view.h"
 
 #include <chrono>
 #include <compare>
@@ -29,13 +35,14 @@
 
 namespace terrane {
 
-/// Of one session's wishes, handed to the service at one time. The others wait in the session, so
-/// that no client fills the work queue.
-inline constexpr std::size_t kWishesUnderWayMax = 128;
-
-/// What a client's priority is clamped to: no wish of one session may starve the others' for long.
+/// What a client's priority is clamped to. It counts among the client's own wishes only.
 inline constexpr std::int32_t kPriorityMin = -8;
 inline constexpr std::int32_t kPriorityMax = 8;
+/// Between two priorities of a client there is room for a whole view: requests of priority 0 come
+/// before all but its near ring, those below 0 after all of it.
+inline constexpr std::int32_t kPriorityStep = 1 << 16;
+/// Answers out of the cache in one go; then the thread's other sessions have their turn.
+inline constexpr std::size_t kAnswersPerTurnMax = 64;
 
 struct SessionTimeouts {
     std::chrono::milliseconds hello{10'000};  ///< connected, and no ClientHello yet
@@ -50,6 +57,10 @@ struct SessionContext {
     ServerHello hello;
     std::string world_file;  ///< canonical
     SessionTimeouts timeouts;
+    SessionCaps caps = {};  ///< of every session; `hello.limits` is made of them
+    /// Asked at each ClientHello what this client may do, or why it may not come in; empty:
+    /// everybody may, with `caps`.
+    std::function<Result<SessionCaps>(const ClientHello&)> admit = {};
 };
 
 /// All calls on one thread, the session's. Made by `std::make_shared`.
@@ -66,8 +77,14 @@ class Session : public std::enable_shared_from_this<Session> {
     void receive(std::span<const std::byte> bytes, Clock::time_point now);
     /// The first bytes of the outbox have been written.
     void written(std::size_t size_bytes, Clock::time_point now);
-    /// Looks at the deadlines; about once a second.
+    /// Looks at the deadlines, and goes on with what had to wait; about once a second, and at
+    /// `wake_at`.
     void tick(Clock::time_point now);
+
+    /// When there is something to send that the client's rate, or a busy service, holds back now:
+    /// the time to call `tick`. Nothing if only events are waited for.
+    std::optional<Clock::time_point> wake_at() const { return wake_at_; }
+
     /// Says Goodbye{draining}; takes no new requests, answers what is under way, then closes.
     void drain();
     /// The connection is gone: cancels what it waits for. Only the destructor may follow.
@@ -86,6 +103,9 @@ class Session : public std::enable_shared_from_this<Session> {
     /// Who it says it is; for logs.
     const std::string& client_name() const { return client_name_; }
 
+    /// Bytes of the view's payloads that were sent and not credited.
+    std::size_t uncredited_bytes() const { return uncredited_bytes_; }
+
     /// Why the session closes, for logs; empty for a client that just left.
     const std::string& close_reason() const { return close_reason_; }
 
@@ -101,11 +121,13 @@ class Session : public std::enable_shared_from_this<Session> {
 
     /// One key or column that has no answer yet.
     struct Wish {
-        std::uint32_t request_id = 0;
+        std::uint32_t request_id = 0;  ///< 0: the view's
         WorkKey key;
-        Hash128 known_etag;  ///< zero: none
-        std::int32_t priority = 0;
-        Rank rank;  ///< given by `add`
+        Hash128 known_etag;         ///< zero: none
+        std::int32_t priority = 0;  ///< as the service takes it
+        Rank rank;                  ///< given by `add`
+
+        bool is_of_view() const { return request_id == 0; }
     };
 
     void process(Clock::time_point now);
@@ -115,6 +137,8 @@ class Session : public std::enable_shared_from_this<Session> {
     void handle_one(const ChunkCancel& cancel);
     void handle_one(const ColumnQuery& query);
     void handle_one(const WorldQuery& query);
+    void handle_one(const ViewUpdate& update);
+    void handle_one(const Credit& credit);
     void handle_one(const Ping& ping);
     void handle_one(const Pong& pong);
     void handle_one(const Goodbye& goodbye);
@@ -122,21 +146,39 @@ class Session : public std::enable_shared_from_this<Session> {
     template <typename Other>
     void handle_one(const Other& other);
 
+    bool takes_request(std::uint32_t request_id);
     void add(Wish wish);
     void submit();
     bool has_room() const;
+    Result<std::optional<Answer>> ask(Wish wish);
+    bool submit_request();
     void deliver(WaiterId waiter, const Result<Answer>& result);
+    void go_on_later();
+
+    bool view_may_ask() const;
+    bool view_is_next() const;
+    bool submit_of_view();
+    void answer_of_view(const Wish& wish, const Result<Answer>& result);
+    bool has_room_for(const ServedChunk& served) const;
+    void drop_unwanted(bool all);
+    void tell_forgotten();
+    void end_view();
+    void set_rate();
+
     void answer(const Wish& wish, const Result<Answer>& result);
     void answer_chunk(const Wish& wish, const ServedChunk& served);
     void answer_column(const Wish& wish, const ServedColumn& column);
     void fail_wish(const Wish& wish, Error error);
     void fail_request(std::uint32_t request_id, Error error);
     void close_with(Error error);
-    void send(const AnyMessage& message, SharedBytes payload = nullptr);
+    void send(const AnyMessage& message, SharedBytes payload = nullptr,
+              std::optional<ChunkPos> of_view = std::nullopt);
     void finish_if_done();
 
     const SessionContext& context_;
     const Post post_;
+    const FlowId flow_;
+    SessionCaps caps_;
     Stage stage_ = Stage::hello;
     FrameReader reader_{kInboundFrameLimits};
     Outbox outbox_;
@@ -144,6 +186,17 @@ class Session : public std::enable_shared_from_this<Session> {
     std::unordered_map<WaiterId, Wish> under_way_;
     std::uint64_t next_sequence_ = 0;
     std::size_t expected_bytes_ = 4096;  ///< mean of the answers so far; the start is a guess
+    bool goes_on_later_ = false;         ///< `submit` has been posted
+    std::optional<View> view_;
+    ViewUpdate last_update_;  ///< without its radii
+    std::size_t view_under_way_ = 0;
+    std::size_t uncredited_bytes_ = 0;
+    bool view_waits_ = false;  ///< its last wish found no room: until something changes
+    std::optional<Clock::time_point> view_retry_at_;  ///< the service was busy
+    TokenBucket byte_rate_;
+    TokenBucket request_rate_;
+    Clock::time_point now_;  ///< the last that we were told
+    std::optional<Clock::time_point> wake_at_;
     std::string client_name_;
     std::string close_reason_;
     const Clock::time_point connected_;

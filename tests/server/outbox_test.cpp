@@ -81,5 +81,58 @@ TEST(Outbox, IsFullAtItsWindow) {
     EXPECT_FALSE(outbox.full());
 }
 
+std::string gathered_text(const Outbox& outbox) {
+    Outbox::Gather parts;
+    std::string text;
+    const std::size_t count = outbox.gather(parts);
+    for (std::size_t i = 0; i < count; ++i) {
+        for (const std::byte byte : parts[i]) {
+            text.push_back(static_cast<char>(byte));
+        }
+    }
+    return text;
+}
+
+Bytes text_bytes(std::string_view text) {
+    const auto bytes = std::as_bytes(std::span(text));
+    return {bytes.begin(), bytes.end()};
+}
+
+void push_chunk(Outbox& outbox, std::string_view head, std::string_view payload, std::int32_t x) {
+    outbox.push(text_bytes(head),
+                payload.empty() ? nullptr : std::make_shared<const Bytes>(text_bytes(payload)),
+                ChunkPos{.lod = 0, .x = x, .y = 0, .z = 0});
+}
+
+TEST(Outbox, WithdrawsWholeChunksOfTheViewAndNothingElse) {
+    Outbox outbox;
+    push_chunk(outbox, "a", "AA", 1);
+    outbox.push(text_bytes("m"), nullptr);
+    push_chunk(outbox, "b", "", 2);
+    push_chunk(outbox, "c", "CCC", 3);
+    outbox.push(text_bytes("n"), std::make_shared<const Bytes>(text_bytes("N")));
+    const auto withdrawn = outbox.withdraw([](ChunkPos key) { return key.x != 2; });
+    EXPECT_EQ(withdrawn.bytes, 7U);
+    EXPECT_EQ(withdrawn.payload_bytes, 5U);
+    EXPECT_EQ(outbox.bytes(), 4U);
+    EXPECT_EQ(gathered_text(outbox), "mbnN");
+}
+
+TEST(Outbox, LeavesWhatAWriteHasInHand) {
+    Outbox outbox;
+    for (std::int32_t x = 0; x < 40; ++x) {
+        push_chunk(outbox, "h", "pp", x);
+    }
+    gathered_text(outbox);  // 32 parts: 16 chunks
+    EXPECT_EQ(outbox.withdraw([](ChunkPos) { return true; }).payload_bytes, 24U * 2);
+    outbox.consume(1);  // the head of the first: its payload must follow
+    EXPECT_EQ(outbox.withdraw([](ChunkPos) { return true; }).payload_bytes, 15U * 2);
+    EXPECT_EQ(gathered_text(outbox), "pp");
+    outbox.consume(1);
+    EXPECT_EQ(outbox.withdraw([](ChunkPos) { return true; }).bytes, 0U);
+    outbox.consume(1);
+    EXPECT_TRUE(outbox.empty());
+}
+
 }  // namespace
 }  // namespace terrane

@@ -1,157 +1,17 @@
 // One session without a socket: bytes in, frames out, time stepped by hand.
 #include "server/net/session.h"
 
-#include "tests/server/gated_step.h"
+#include "tests/server/session_fixture.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <condition_variable>
 
 namespace terrane {
 namespace {
 
 using namespace std::chrono_literals;
-
-/// What the workers post, run by the test's thread.
-class Mailbox {
-  public:
-    Session::Post post() {
-        return [this](std::function<void()> step) {
-            const MutexLock lock(mutex_);
-            steps_.push_back(std::move(step));
-            changed_.notify_all();
-        };
-    }
-
-    void run(std::size_t count) {
-        for (std::size_t i = 0; i < count; ++i) {
-            const auto step = take();
-            ASSERT_TRUE(step) << "posted " << i << " of " << count << " steps";
-            step();
-        }
-    }
-
-  private:
-    /// Nothing if none comes for a long time.
-    std::function<void()> take() {
-        const auto deadline = std::chrono::steady_clock::now() + 60s;
-        MutexLock lock(mutex_);
-        while (steps_.empty()) {
-            if (std::chrono::steady_clock::now() >= deadline) {
-                return nullptr;
-            }
-            lock.wait_until(changed_, deadline);
-        }
-        auto step = std::move(steps_.front());
-        steps_.erase(steps_.begin());
-        return step;
-    }
-
-    Mutex mutex_;
-    std::condition_variable_any changed_;
-    std::vector<std::function<void()>> steps_ TERRANE_GUARDED_BY(mutex_);
-};
-
-ClientHello client_hello(std::uint32_t version = kProtocolVersion) {
-    return {.protocol_version = version, .client_name = "test", .token = {}, .formats = {}};
-}
-
-ChunkRequest chunk_request(std::uint32_t id, std::vector<ChunkPos> keys,
-                           std::vector<Hash128> etags = {}, std::int32_t priority = 0) {
-    ChunkRequest request;
-    request.request_id = id;
-    request.keys = std::move(keys);
-    request.known_etags = std::move(etags);
-    request.priority = priority;
-    return request;
-}
-
-constexpr Hash128 kEtag{.high = 1, .low = 2};
-
-struct Fixture {
-    explicit Fixture(std::size_t payload_bytes = 1000, bool open = true) {
-        gate.open = open;
-        gate.chunk.status = ChunkStatus::full;
-        gate.chunk.etag = kEtag;
-        gate.chunk.payload = std::make_shared<const Bytes>(payload_bytes);
-        service.emplace(ServiceOptions{.cache_bytes_max = std::size_t{64} << 20U}, counters,
-                        gate.maker());
-        context.service = &*service;
-        context.hello.protocol_version = kProtocolVersion;
-        context.hello.world_name = "drawn";
-        context.hello.chunk_side = 32;
-        context.hello.chunk_height = 32;
-        context.hello.voxel_size_m = 1;
-        context.hello.levels = 1;
-        context.hello.limits = {.keys_per_request_max = kKeysPerRequestMax,
-                                .keys_in_flight_max = kKeysInFlightPerSessionMax,
-                                .inbound_frame_bytes_max = kInboundFrameBytesMax,
-                                .payload_bytes_max = kPayloadBytesMax};
-        context.world_file = "format = 1\n";
-        session = std::make_shared<Session>(context, mailbox.post(), now);
-    }
-
-    ~Fixture() {
-        gate.passes.release(10000);
-        session->end();
-        service->stop();
-    }
-
-    void send(const AnyMessage& message) { session->receive(encode_message(message), now); }
-
-    void hello() {
-        send(client_hello());
-        ASSERT_EQ(read().size(), 1U);
-    }
-
-    void request(std::uint32_t id, std::vector<ChunkPos> keys, std::vector<Hash128> etags = {},
-                 std::int32_t priority = 0) {
-        send(chunk_request(id, std::move(keys), std::move(etags), priority));
-    }
-
-    /// Reads everything that is in the outbox, as a client does.
-    std::vector<AnyMessage> read() {
-        std::vector<AnyMessage> messages;
-        FrameReader reader(kOutboundFrameLimits);
-        while (!session->outbox().empty()) {
-            Outbox::Gather parts;
-            const std::size_t count = session->outbox().gather(parts);
-            std::size_t size_bytes = 0;
-            for (std::size_t i = 0; i < count; ++i) {
-                reader.feed(parts[i]);
-                size_bytes += parts[i].size();
-                for (auto frame = reader.next(); frame && *frame; frame = reader.next()) {
-                    auto message = decode_message(**frame);
-                    if (!message) {
-                        ADD_FAILURE() << message.error().message;
-                        return messages;
-                    }
-                    messages.push_back(*std::move(message));
-                }
-            }
-            session->written(size_bytes, now);
-        }
-        return messages;
-    }
-
-    Gate gate;
-    ServiceCounters counters;
-    std::optional<ChunkService> service;
-    SessionContext context;
-    Mailbox mailbox;
-    Session::Clock::time_point now{};
-    std::shared_ptr<Session> session;
-};
-
-ChunkPos at(std::int32_t x, std::int32_t y = 0) {
-    return {.lod = 0, .x = x, .y = y, .z = 0};
-}
-
-ErrorCode failure_code(const AnyMessage& message) {
-    const auto* failure = std::get_if<Failure>(&message);
-    return failure == nullptr ? static_cast<ErrorCode>(0) : failure->error.code;
-}
+using Fixture = SessionFixture;
 
 TEST(Session, AnswersHelloWithTheWorld) {
     Fixture f;
