@@ -35,7 +35,7 @@ class ByteProtocol {
     virtual std::size_t gather(Outbox::Gather& out) = 0;
     /// The first `size_bytes` of what waits have been written.
     virtual void written(std::size_t size_bytes, Clock::time_point now) = 0;
-    /// Looks at the deadlines; about once a second.
+    /// Looks at the deadlines; about once a second, and at `wake_at`.
     virtual void tick(Clock::time_point now) = 0;
 
     /// When `tick` is wanted sooner than usual; nothing: only events are waited for.

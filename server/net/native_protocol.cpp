@@ -27,8 +27,6 @@ class NativeProtocol final : public ByteProtocol {
 
     std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
 
-    std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
-
     void drain() override { session_->drain(); }
 
     void end() override { session_->end(); }

@@ -156,8 +156,6 @@ class WebSocketProtocol final : public ByteProtocol {
 
     std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
 
-    std::optional<Clock::time_point> wake_at() const override { return session_->wake_at(); }
-
     void drain() override {
         draining_ = true;
         session_->drain();

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 
 namespace terrane {
@@ -401,6 +402,138 @@ TEST(Client, ChunksThatNobodyAskedForAreMalformed) {
         ASSERT_TRUE(client->request(row_of_keys(1), ChunkFormat::draco));
         EXPECT_EQ(code_of_next(*client), ErrorCode::malformed);
     }
+}
+
+ServerHello view_hello() {
+    ServerHello hello = test_hello();
+    hello.limits.view_radius_max = 16;
+    hello.limits.credit_window_bytes = 1000;
+    return hello;
+}
+
+ChunkAnswer view_chunk(std::int32_t x, std::uint32_t payload_bytes) {
+    return {.request_id = 0,
+            .key = {.lod = 0, .x = x, .y = 0, .z = 0},
+            .format = ChunkFormat::draco,
+            .status = ChunkStatus::full,
+            .source = ChunkSource::cache,
+            .etag = {},
+            .timings = {},
+            .payload_bytes = payload_bytes,
+            .uniform = {}};
+}
+
+TEST(Client, AViewsChunksComeAndCreditFollowsWhenTheyAreConsumed) {
+    const ScriptedPeer peer([](PeerSocket& server) {
+        server.greet(view_hello());
+        const auto update = server.receive_kind<ViewUpdate>();
+        ASSERT_TRUE(update);
+        EXPECT_EQ(update->radius_chunks, (std::vector<std::uint32_t>{2, 1}));
+        server.send(view_chunk(1, 100), Bytes(100));
+        server.send(view_chunk(2, 300), Bytes(300));
+        server.send(ChunkForget{.keys = {{.lod = 1, .x = 3, .y = 0, .z = 4}}});
+        // In one message or two, as the chunks happen to arrive.
+        std::uint64_t credit = 0;
+        while (credit < 400) {
+            const auto some = server.receive_kind<Credit>();
+            ASSERT_TRUE(some);
+            credit += some->bytes;
+        }
+        EXPECT_EQ(credit, 400U);
+        server.send(view_chunk(3, 10), Bytes(10));
+        server.send(Failure{.request_id = 0,
+                            .error = {.code = ErrorCode::internal, .message = "no"},
+                            .retry_after_ms = 0,
+                            .key = ChunkPos{}});
+        server.send(Failure{.request_id = 0,
+                            .error = {.code = ErrorCode::busy, .message = "later"},
+                            .retry_after_ms = 9,
+                            .key = std::nullopt});
+        const auto second = server.receive_kind<Credit>();
+        ASSERT_TRUE(second);
+        EXPECT_EQ(second->bytes, 10U) << "little, but nothing else is at hand";
+        server.send(Failure{.request_id = 0,
+                            .error = {.code = ErrorCode::draining, .message = "the end"},
+                            .retry_after_ms = 0,
+                            .key = std::nullopt});
+    });
+    auto client = connect(peer);
+    ASSERT_TRUE(client) << client.error().message;
+    ViewUpdate update;
+    update.radius_chunks = {2, 1};
+    ASSERT_TRUE(client->view(update));
+    for (const std::int32_t x : {1, 2}) {
+        const auto event = next(*client);
+        ASSERT_TRUE(event && *event);
+        EXPECT_EQ(std::get<ReceivedChunk>(**event).answer.key.x, x);
+    }
+    auto event = next(*client);
+    ASSERT_TRUE(event && *event);
+    EXPECT_EQ(std::get<ChunkForget>(**event).keys.at(0).z, 4);
+    event = next(*client);
+    ASSERT_TRUE(event && *event);
+    EXPECT_EQ(std::get<ReceivedChunk>(**event).payload.size(), 10U);
+    event = next(*client);
+    ASSERT_TRUE(event && *event);
+    EXPECT_TRUE(std::get<Failure>(**event).key);
+    event = next(*client);
+    ASSERT_TRUE(event && *event);
+    EXPECT_EQ(std::get<Failure>(**event).error.code, ErrorCode::busy);
+    EXPECT_EQ(next(*client).error().code, ErrorCode::draining);
+}
+
+TEST(Client, RefusesAViewThatNoServerTakes) {
+    const ScriptedPeer peer([](PeerSocket& server) {
+        server.greet(view_hello());
+        EXPECT_TRUE(server.receive_kind<ViewUpdate>());
+    });
+    auto client = connect(peer);
+    ASSERT_TRUE(client) << client.error().message;
+    ViewUpdate update;
+    update.x = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(client->view(update).error().code, ErrorCode::invalid_argument);
+    update.x = 1e300;
+    EXPECT_EQ(client->view(update).error().code, ErrorCode::out_of_range);
+    update.x = 0;
+    update.radius_chunks.resize(19);
+    EXPECT_EQ(client->view(update).error().code, ErrorCode::invalid_argument);
+    update.radius_chunks.resize(1);
+    EXPECT_TRUE(client->view(update)) << "nothing was sent before";
+}
+
+TEST(Client, SaysThatAServerGivesNoViews) {
+    const ScriptedPeer peer([](PeerSocket& server) { server.greet(); });
+    auto client = connect(peer);
+    ASSERT_TRUE(client) << client.error().message;
+    EXPECT_EQ(client->view(ViewUpdate{}).error().code, ErrorCode::unsupported);
+}
+
+TEST(Client, ViewChunksWithoutAViewAreMalformed) {
+    const ScriptedPeer peer([](PeerSocket& server) {
+        server.greet(view_hello());
+        server.send(view_chunk(1, 1), Bytes(1));
+        server.wait_for_end();
+    });
+    auto client = connect(peer);
+    ASSERT_TRUE(client) << client.error().message;
+    EXPECT_EQ(next(*client).error().code, ErrorCode::malformed);
+}
+
+TEST(Client, PassesOverKindsThatOnlyANewerServerKnows) {
+    const ScriptedPeer peer([](PeerSocket& server) {
+        server.greet(view_hello());
+        Bytes unknown = encode_message(Credit{.bytes = 1});
+        ASSERT_EQ(unknown[35], std::byte{16}) << "WIRE_FORMAT.md shows where the kind stands";
+        unknown[35] = std::byte{99};
+        server.send_bytes(unknown);
+        server.send(Pong{.nonce = 5});
+        server.wait_for_end();
+    });
+    auto client = connect(peer);
+    ASSERT_TRUE(client) << client.error().message;
+    const auto event = next(*client);
+    ASSERT_TRUE(event && *event) << event.error().message;
+    EXPECT_EQ(std::get<Pong>(**event).nonce, 5U);
 }
 
 }  // namespace
