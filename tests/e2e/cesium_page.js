@@ -52,7 +52,8 @@ async function run() {
             }
             state.visible = selected;
             state.ready = numberOfTilesWithContentReady;
-            state.levels = [...new Set(tileset._selectedTiles.map((tile) => tile._depth))].sort((a, b) => a - b);
+            state.levels = [...new Set(tileset._selectedTiles.map(
+                (tile) => Math.log2(tile.geometricError / numbers('voxel')[0])))].sort((a, b) => a - b);
             state.done = true;
         }
     });
