@@ -36,24 +36,51 @@ async function run() {
         destination: eye,
         orientation: { direction, up: Cesium.Cartesian3.cross(right, direction, new Cesium.Cartesian3()) },
     });
+    // From the south west, as in the other page; not from where the sun is today.
+    const light = Cesium.Matrix4.multiplyByPointAsVector(
+        frame, new Cesium.Cartesian3(3, -2.5, -4), new Cesium.Cartesian3());
+    scene.light = new Cesium.DirectionalLight({
+        direction: Cesium.Cartesian3.normalize(light, light), intensity: 2.5,
+    });
+
+    /** Pixels that show the background. */
+    function holes() {
+        const gl = scene.context._gl;
+        const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+        const pixels = new Uint8Array(width * height * 4);
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        let count = 0;
+        for (let i = 0; i < pixels.length; i += 4) {
+            if (pixels[i] > 250 && pixels[i + 1] < 5 && pixels[i + 2] > 250) {
+                ++count;
+            }
+        }
+        return count;
+    }
+
     let quiet = 0;
     scene.postRender.addEventListener(() => {
-        const { numberOfTilesWithContentReady, selected } = tileset.statistics;
-        quiet = tileset.tilesLoaded && selected > 0 ? quiet + 1 : 0;
-        if (quiet > 20 && !state.done) {
-            const gl = scene.context._gl;
-            const pixels = new Uint8Array(800 * 600 * 4);
-            gl.readPixels(0, 0, 800, 600, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-            state.holes = 0;
-            for (let i = 0; i < pixels.length; i += 4) {
-                if (pixels[i] > 250 && pixels[i + 1] < 5 && pixels[i + 2] > 250) {
-                    ++state.holes;
-                }
-            }
-            state.visible = selected;
-            state.ready = numberOfTilesWithContentReady;
-            state.levels = [...new Set(tileset._selectedTiles.map((tile) => tile._depth))].sort((a, b) => a - b);
+        if (state.done) {
+            return;
+        }
+        if (!tileset.show) {
+            // Would holes be seen if there were any? Without tiles there is nothing else.
+            state.holesWithoutTiles = holes();
+            tileset.show = true;
+            return;
+        }
+        if (state.holesWithoutTiles !== undefined) {
             state.done = true;
+            return;
+        }
+        const { selected } = tileset.statistics;
+        quiet = tileset.tilesLoaded && selected > 0 ? quiet + 1 : 0;
+        if (quiet > 10) {
+            state.holes = holes();
+            state.visible = selected;
+            state.levels = [...new Set(tileset._selectedTiles.map(
+                (tile) => Math.log2(tile.geometricError / numbers('voxel')[0])))].sort((a, b) => a - b);
+            tileset.show = false;
         }
     });
 }

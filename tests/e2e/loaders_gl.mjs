@@ -48,7 +48,10 @@ export async function walkExplicit(url, eye, { errorTarget, tilesMax }) {
 
     await openDocument(url);
     wanted.sort((a, b) => a.away - b.away);
-    for (const { uri } of wanted.slice(0, tilesMax)) {
+    // Near and far ones, evenly.
+    const every = Math.max(1, wanted.length / tilesMax);
+    for (let i = 0; i < wanted.length; i += every) {
+        const { uri } = wanted[Math.floor(i)];
         const tile = await load(uri, Tiles3DLoader, OPTIONS);
         const gltf = tile.gltf;
         for (const mesh of gltf.meshes ?? gltf.json?.meshes ?? []) {

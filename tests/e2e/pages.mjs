@@ -25,7 +25,7 @@ export async function makePages(here, out) {
     await writeFile(join(out, 'three.html'),
         html('three', '<script type="module" src="three_page.js"></script>'));
     await writeFile(join(out, 'cesium.html'), html('cesium',
-        '<div id="scene" style="width:800px;height:600px"></div>'
+        '<style>#scene,#scene *{width:800px;height:600px}</style><div id="scene"></div>'
         + '<script>window.CESIUM_BASE_URL="/cesium/"</script>'
         + '<script src="/cesium/Cesium.js"></script><script src="cesium_page.js"></script>'));
 }

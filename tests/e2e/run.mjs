@@ -1,6 +1,7 @@
 // Terrane's 3D Tiles in the programs that others use. One line a check; exit code 1 if any failed.
 //
-//     node run.mjs TERRANE WORLDS [--all]     the program, and the folder of the shipped worlds
+//     node run.mjs TERRANE WORLDS [--all] [--world NAME]...
+//         the program, the folder of the shipped worlds, and which of them
 //
 // Quick: every kind of tile of one world through gltf-validator, three + 3d-tiles-renderer and
 // loaders.gl. `--all`: more worlds, and CesiumJS too. Screenshots are left in ./screenshots.
@@ -13,11 +14,13 @@ import { walkExplicit } from './loaders_gl.mjs';
 import { makePages, openBrowser, see } from './pages.mjs';
 
 const [program, worlds, ...flags] = process.argv.slice(2);
-if (!program || !worlds || flags.some((flag) => flag !== '--all')) {
-    console.error('usage: node run.mjs TERRANE WORLDS [--all]');
+const all = flags.includes('--all');
+const named = flags.flatMap((flag, i) => (flags[i - 1] === '--world' ? [flag] : []));
+if (!program || !worlds || flags.some((flag, i) =>
+    flag !== '--all' && flag !== '--world' && flags[i - 1] !== '--world')) {
+    console.error('usage: node run.mjs TERRANE WORLDS [--all] [--world NAME]...');
     process.exit(2);
 }
-const all = flags.includes('--all');
 const here = dirname(fileURLToPath(import.meta.url));
 const shots = join(here, 'screenshots');
 const out = join(here, 'pages');
@@ -87,6 +90,8 @@ function expectGround(state) {
     expect(state.visible >= 10, `only ${state.visible} tiles are visible`);
     expect(state.levels.length >= 3, `only levels ${state.levels}`);
     expect(state.holes === 0, `${state.holes} pixels show no ground`);
+    expect(state.holesWithoutTiles === 800 * 600,
+        `holes would not be seen: ${state.holesWithoutTiles} pixels without tiles`);
     return `${state.visible} tiles of levels ${state.levels.join(',')}, 0 errors, 0 hole pixels`;
 }
 
@@ -101,9 +106,10 @@ async function checkWorld(name, browser, pages) {
         const view = await viewOf(terrane, 30, 150);
         const eye = view.eye.join();
         const look = view.look.join();
+        const voxel = terrane.world.voxel_size_m;
         await check(`${name}: three + 3d-tiles-renderer`, async () => {
             const tileset = `${terrane.content}/3dtiles/tileset.json`;
-            const state = await see(browser, `${pages}/three.html?${query({ tileset, eye, look })}`,
+            const state = await see(browser, `${pages}/three.html?${query({ tileset, eye, look, voxel })}`,
                 join(shots, `${name}-three.png`));
             return expectGround(state);
         });
@@ -111,6 +117,7 @@ async function checkWorld(name, browser, pages) {
             const seen = await walkExplicit(`${terrane.content}/3dtiles/explicit/tileset.json`,
                 view.eye, { errorTarget: 12, tilesMax: 60 });
             expect(seen.documents >= 6, `only ${seen.documents} documents`);
+            expect(seen.levels.size >= 4, `only levels ${[...seen.levels]}`);
             expect(seen.tiles >= 20 && seen.triangles > 10000, JSON.stringify(seen));
             return `${seen.tiles} of ${seen.wanted} tiles of levels `
                 + `${[...seen.levels].sort((a, b) => a - b)}, ${seen.triangles} triangles`;
@@ -119,7 +126,7 @@ async function checkWorld(name, browser, pages) {
             await check(`${name}: Cesium`, async () => {
                 const tileset = `${terrane.content}/3dtiles/tileset-geo.json`;
                 const state = await see(browser,
-                    `${pages}/cesium.html?${query({ tileset, eye, look })}`,
+                    `${pages}/cesium.html?${query({ tileset, eye, look, voxel })}`,
                     join(shots, `${name}-cesium.png`), 240000);
                 return expectGround(state);
             });
@@ -136,7 +143,8 @@ const pages = await startPages({
 });
 const browser = await openBrowser();
 try {
-    for (const name of all ? ['basin', 'ore-mountain', 'paper-B3'] : ['basin']) {
+    const names = all ? ['basin', 'ore-mountain', 'paper-B3'] : ['basin'];
+    for (const name of named.length > 0 ? named : names) {
         await checkWorld(name, browser, pages.origin);
     }
 } finally {

@@ -15,13 +15,19 @@ export async function startTerrane(program, world) {
     const child = spawn(program, ['serve', '--world', world, '--store', 'memory', '--tcp',
         '127.0.0.1:0', '--http', '127.0.0.1:0', '--log-level', 'warning'],
         { stdio: ['ignore', 'pipe', 'inherit'] });
+    // Whatever ends this program ends the server.
+    const end = () => child.kill('SIGKILL');
+    process.once('exit', end);
+    for (const signal of ['SIGINT', 'SIGTERM']) {
+        process.once(signal, () => process.exit(1));
+    }
     const ended = new Promise((resolve) => child.once('exit', (code) => resolve(code)));
     let text = '';
     const origin = await new Promise((resolve, reject) => {
         const timer = setTimeout(() => reject(new Error(`terrane said only: ${text}`)), 60000);
         child.stdout.on('data', (bytes) => {
             text += bytes;
-            const found = text.match(/listening on http ([0-9.:]+)/);
+            const found = text.match(/listening on http ([0-9.]+:[0-9]+)/);
             if (found) {
                 clearTimeout(timer);
                 resolve(`http://${found[1]}`);
@@ -37,6 +43,7 @@ export async function startTerrane(program, world) {
         async stop() {
             child.kill('SIGTERM');
             const code = await ended;
+            process.off('exit', end);
             if (code !== 0) {
                 throw new Error(`terrane ended with ${code}`);
             }

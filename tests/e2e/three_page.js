@@ -62,10 +62,17 @@ function frame() {
     quiet = tiles.visibleTiles.size > 0 && downloading + parsing + queued === 0 ? quiet + 1 : 0;
     if (quiet > 20) {
         state.visible = tiles.visibleTiles.size;
+        // A tile's error is 2^level voxels.
         state.levels = [...new Set([...tiles.visibleTiles].map(
-            (tile) => tile.implicitTiling?.level ?? tile.__depth ?? tile.internal?.depth ?? tile.geometricError))].sort((a, b) => a - b);
+            (tile) => Math.log2(tile.geometricError / numbers('voxel')[0])))].sort((a, b) => a - b);
         state.triangles = renderer.info.render.triangles;
         state.holes = holes();
+        // Would holes be seen if there were any? Without tiles there is nothing else.
+        tiles.group.visible = false;
+        renderer.render(scene, camera);
+        state.holesWithoutTiles = holes();
+        tiles.group.visible = true;
+        renderer.render(scene, camera);
         state.done = true;
         return;
     }
