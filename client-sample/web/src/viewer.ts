@@ -73,6 +73,10 @@ export class Viewer {
         ui: HTMLElement,
     ) {
         const query = new URLSearchParams(location.search);
+        const address = query.get('server') ?? '';
+        this.url = webSocketUrl(address, location);
+        // First of all: the worker greets the server while this thread makes textures and programs.
+        this.send({ kind: 'connect', url: this.url, token: query.get('token') ?? '' });
         this.stage = new Stage(canvas);
         const hour = Number(query.get('hour'));
         if (hour > 0) {
@@ -92,8 +96,6 @@ export class Viewer {
             this.controls.pitch = place.pitch;
         }
         this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
-        const address = query.get('server') ?? '';
-        this.url = webSocketUrl(address, location);
         this.shell = new Shell(ui, this.actions(), this.stage.hour, address);
         this.panel = new FiguresPanel(() => this.compare());
         this.map = new MiniMap((x, z) => this.jump(x, undefined, z));
@@ -101,7 +103,6 @@ export class Viewer {
         this.shell.press('format', this.format === 'columns', this.format === 'columns' ? 'Columns' : 'Draco');
         this.connectControls();
         this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
-        this.send({ kind: 'connect', url: this.url, token: query.get('token') ?? '' });
         window.addEventListener('resize', () => {
             this.stage.resize();
             this.needsFrame = true;

@@ -28,7 +28,7 @@ export const lightUniforms = {
     uHorizon: { value: new THREE.Color() },
     uAmbient: { value: new THREE.Color() },
     /** Share of light lost by a voxel of air at height 0, and how it thins with height. */
-    uFogDensity: { value: 0.00009 },
+    uFogDensity: { value: 0.00017 },
     uFogFalloff: { value: 0.0022 },
     uTime: { value: 0 },
 };
