@@ -32,6 +32,12 @@ std::string to_text(ChunkPos key) {
            std::to_string(key.y) + "/" + std::to_string(key.z);
 }
 
+/// What a Failure without id or key may say of one message, after which the session goes on.
+bool is_about_one_message(ErrorCode code) {
+    return code == ErrorCode::invalid_argument || code == ErrorCode::out_of_range ||
+           code == ErrorCode::unsupported || code == ErrorCode::busy;
+}
+
 }  // namespace
 
 class Client::Session {
@@ -43,6 +49,7 @@ class Client::Session {
     Result<std::uint32_t> request(std::span<const ChunkPos> keys, ChunkFormat format,
                                   std::int32_t priority);
     Result<void> cancel(std::uint32_t request_id);
+    Result<void> view(const ViewUpdate& update);
     Result<void> send(const AnyMessage& message);
     Result<std::optional<ClientEvent>> next(Deadline deadline);
 
@@ -67,6 +74,7 @@ class Client::Session {
     }
 
     Result<void> send_what_is_due();
+    Result<void> give_credit(std::size_t above_bytes);
     Result<void> send_batch();
     Result<std::optional<AnyMessage>> read_message(Bytes& payload);
     Result<void> receive(Deadline deadline);
@@ -88,6 +96,9 @@ class Client::Session {
     std::map<std::uint32_t, std::vector<Wanted>> in_flight_;  ///< by the id on the wire
     std::set<std::uint32_t> queries_;
     std::deque<ClientEvent> events_;
+    bool has_view_ = false;           ///< one has been asked for
+    std::size_t given_bytes_ = 0;     ///< of the view's chunk that `next` gave last
+    std::size_t consumed_bytes_ = 0;  ///< of the view's chunks, and not credited yet
 };
 
 Result<void> Client::Session::greet(const ClientOptions& options, Deadline deadline) {
@@ -160,6 +171,9 @@ Result<std::uint32_t> Client::Session::request(std::span<const ChunkPos> keys, C
 }
 
 Result<void> Client::Session::cancel(std::uint32_t request_id) {
+    if (request_id == 0) {  // the view's
+        return {};
+    }
     unanswered_ -=
         std::erase_if(waiting_, [&](const Wanted& w) { return w.request_id == request_id; });
     unanswered_ -=
@@ -192,6 +206,32 @@ Result<void> Client::Session::cancel(std::uint32_t request_id) {
         cancel.request_ids.erase(first, cancel.request_ids.end());
     }
     return {};
+}
+
+Result<void> Client::Session::view(const ViewUpdate& update) {
+    if (hello_.limits.view_radius_max == 0) {
+        return fail(ErrorCode::unsupported, "this server gives no views");
+    }
+    // What the server would refuse is told here, where it can be put right.
+    FrameReader reader(kInboundFrameLimits);
+    reader.feed(encode_message(update));
+    const auto frame = reader.next();
+    if (!frame || !*frame) {
+        return fail(ErrorCode::invalid_argument, "ViewUpdate: too large for a frame");
+    }
+    if (const auto checked = decode_message(**frame); !checked) {
+        return tl::unexpected(checked.error());
+    }
+    has_view_ = true;
+    return send(update);
+}
+
+/// Gives back what has been consumed, if it is more than `above_bytes`.
+Result<void> Client::Session::give_credit(std::size_t above_bytes) {
+    if (consumed_bytes_ <= above_bytes) {
+        return {};
+    }
+    return send(Credit{.bytes = std::exchange(consumed_bytes_, 0)});
 }
 
 Result<void> Client::Session::send(const AnyMessage& message) {
@@ -251,7 +291,10 @@ Result<void> Client::Session::send_batch() {
 /// The next message of what has been received, its payload copied out; nothing if it is not whole
 /// yet.
 Result<std::optional<AnyMessage>> Client::Session::read_message(Bytes& payload) {
-    const auto frame = reader_.next();
+    auto frame = reader_.next();
+    while (frame && *frame && !is_known(**frame)) {  // a newer server's: passed over
+        frame = reader_.next();
+    }
     if (!frame) {
         return tl::unexpected(frame.error());
     }
@@ -280,10 +323,19 @@ Result<void> Client::Session::receive(Deadline deadline) {
 }
 
 Result<std::optional<ClientEvent>> Client::Session::next(Deadline deadline) {
+    consumed_bytes_ += std::exchange(given_bytes_, 0);
+    // In quarters of the window: a message for several chunks, and the server never has to wait.
+    if (const auto given = give_credit(hello_.limits.credit_window_bytes / 4); !given) {
+        return broken(given);
+    }
     for (bool is_expired = false;;) {
         if (!events_.empty()) {
             ClientEvent event = std::move(events_.front());
             events_.pop_front();
+            if (const auto* chunk = std::get_if<ReceivedChunk>(&event);
+                chunk != nullptr && chunk->answer.request_id == 0) {
+                given_bytes_ = chunk->payload.size();
+            }
             return event;
         }
         if (error_) {
@@ -305,6 +357,9 @@ Result<std::optional<ClientEvent>> Client::Session::next(Deadline deadline) {
         }
         if (is_expired) {
             return std::nullopt;
+        }
+        if (const auto given = give_credit(0); !given) {  // nothing else is at hand
+            return broken(given);
         }
         const Deadline wake =
             paused_.empty() ? deadline : std::min(deadline, paused_.begin()->first);
@@ -339,6 +394,10 @@ Result<void> Client::Session::take(AnyMessage message, Bytes payload) {
         events_.emplace_back(*pong);
         return {};
     }
+    if (auto* forget = std::get_if<ChunkForget>(&message); forget != nullptr && has_view_) {
+        events_.emplace_back(std::move(*forget));
+        return {};
+    }
     if (auto* goodbye = std::get_if<Goodbye>(&message)) {
         events_.emplace_back(std::move(*goodbye));
         return {};
@@ -348,6 +407,11 @@ Result<void> Client::Session::take(AnyMessage message, Bytes payload) {
 }
 
 Result<void> Client::Session::take_chunk(const ChunkAnswer& answer, Bytes payload) {
+    if (answer.request_id == 0 && has_view_) {
+        events_.emplace_back(
+            ReceivedChunk{.answer = answer, .payload = std::move(payload), .waited = {}});
+        return {};
+    }
     const auto sent = in_flight_.find(answer.request_id);
     const auto matches = [&](const Wanted& w) {
         return w.key == answer.key && w.format == answer.format;
@@ -378,6 +442,10 @@ Result<void> Client::Session::take_chunk(const ChunkAnswer& answer, Bytes payloa
 
 Result<void> Client::Session::take_failure(const Failure& failure) {
     if (failure.request_id == 0) {
+        if (has_view_ && (failure.key || is_about_one_message(failure.error.code))) {
+            events_.emplace_back(failure);
+            return {};
+        }
         return tl::unexpected(failure.error);
     }
     if (queries_.erase(failure.request_id) > 0) {
@@ -461,6 +529,10 @@ Result<std::uint32_t> Client::request(std::span<const ChunkPos> keys, ChunkForma
 
 Result<void> Client::cancel(std::uint32_t request_id) {
     return session_->cancel(request_id);
+}
+
+Result<void> Client::view(const ViewUpdate& update) {
+    return session_->view(update);
 }
 
 Result<std::uint32_t> Client::query_column(ColumnPos column) {

@@ -9,6 +9,16 @@
 //         chunk->answer.key, chunk->payload ... }
 //     }
 //
+// Or say where the viewer is, as often as it moves, and let the server choose what comes and in
+// which order; of what `next` gives, the chunks with request id 0 are the view's:
+//
+//     client->view({.x = 100, .y = 70, .z = -30, .radius_chunks = {16, 16, 16}});
+//     ... ReceivedChunk: show it; ChunkForget: these have left the view
+//
+// Chunks of a view are sent as far ahead as the server's credit window goes. A chunk counts as
+// consumed when `next` is called again, so do with it what must be done, decoding included, before
+// that.
+//
 // The library keeps to the server's limits: keys are split over requests, no more are under way
 // than the server takes, and a `busy` key is asked for again after the time that the server names,
 // a bounded number of times. A client belongs to one thread at a time; nothing happens outside its
@@ -52,10 +62,13 @@ struct ClientOptions {
 struct ReceivedChunk {
     ChunkAnswer answer;
     Bytes payload;
-    std::chrono::microseconds waited{};  ///< from the first time it was sent for
+    std::chrono::microseconds waited{};  ///< from the first time it was sent for; 0: of the view
 };
 
-using ClientEvent = std::variant<ReceivedChunk, Failure, ColumnAnswer, WorldAnswer, Pong, Goodbye>;
+/// A Failure with request id 0 is about a chunk of the view if it has a key, else about the last
+/// view.
+using ClientEvent =
+    std::variant<ReceivedChunk, Failure, ColumnAnswer, WorldAnswer, Pong, Goodbye, ChunkForget>;
 
 class Client {
   public:
@@ -77,6 +90,11 @@ class Client {
     /// Nothing of that request will be given out by `next` any more. An unknown or finished id does
     /// nothing.
     Result<void> cancel(std::uint32_t request_id);
+
+    /// What is to be seen from now on, instead of what was; no radii: nothing. Fails with
+    /// `invalid_argument` or `out_of_range` for what no server takes (messages.h), `unsupported` if
+    /// this one gives no views. Radii above hello().limits.view_radius_max count as that.
+    Result<void> view(const ViewUpdate& update);
 
     /// Answered by a ColumnAnswer or a Failure with the id that is given here.
     Result<std::uint32_t> query_column(ColumnPos column);

@@ -512,6 +512,10 @@ Result<AnyMessage> decode_message(const Frame& frame) {
     return message;
 }
 
+bool is_known(const Frame& frame) {
+    return frame.head->body_type() <= wire::Body::MAX;
+}
+
 std::uint32_t request_id_of(const Frame& frame) {
     const wire::Message& head = *frame.head;
     if (const auto* request = head.body_as_ChunkRequest()) {

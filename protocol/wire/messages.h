@@ -261,6 +261,10 @@ Bytes encode_message(const AnyMessage& message);
 /// `out_of_range`): answer it with a Failure of `request_id_of` and go on.
 Result<AnyMessage> decode_message(const Frame& frame);
 
+/// Whether the frame is of a kind that this build knows: a client passes over others, which a newer
+/// server may send.
+bool is_known(const Frame& frame);
+
 /// The request id in a frame's head, 0 if that kind of message has none: what a Failure about a
 /// message that did not decode refers to.
 std::uint32_t request_id_of(const Frame& frame);
