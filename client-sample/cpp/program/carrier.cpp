@@ -1,5 +1,6 @@
 #include "client-sample/cpp/program/carrier.h"
 
+#include "client-sample/cpp/program/http_carrier.h"
 #include "client-sample/cpp/program/websocket_stream.h"
 
 #include <utility>
@@ -76,6 +77,9 @@ class WebSocketCarrier final : public Carrier {
 std::unique_ptr<Carrier> make_carrier(CarrierKind kind, const CarrierAddress& address) {
     if (kind == CarrierKind::tcp) {
         return std::make_unique<TcpCarrier>();
+    }
+    if (kind == CarrierKind::http) {
+        return std::make_unique<HttpCarrier>(address);
     }
     return std::make_unique<WebSocketCarrier>(address);
 }

@@ -1,5 +1,6 @@
-// How the native protocol's messages travel on a byte stream: as they are (TCP), or in a WebSocket.
-// No socket here: bytes in, bytes out, so that one loop carries all of them and tests step each.
+// How the native protocol's messages travel on a byte stream: as they are (TCP), in a WebSocket,
+// or as HTTP requests. No socket here: bytes in, bytes out, so that one loop carries all of them
+// and tests step each.
 #pragma once
 
 #include "protocol/base/bytes.h"
@@ -14,7 +15,7 @@
 
 namespace terrane {
 
-enum class CarrierKind : std::uint8_t { tcp, web_socket };
+enum class CarrierKind : std::uint8_t { tcp, web_socket, http };
 
 /// A message and what followed it; the payload lives until the carrier's next call.
 struct CarriedMessage {
@@ -40,7 +41,8 @@ class Carrier {
     /// The next whole message; nothing if more bytes are needed.
     virtual Result<std::optional<CarriedMessage>> next() = 0;
 
-    /// What the carrier itself wants to say, a pong for instance; empty if nothing.
+    /// What the carrier itself wants to say, a pong or the next request; empty if nothing. To be
+    /// asked for after every `next` that gave something.
     virtual Bytes take_reply() { return {}; }
 };
 

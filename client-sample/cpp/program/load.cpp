@@ -19,6 +19,8 @@ using Clock = LoadClient::Clock;
 constexpr std::chrono::milliseconds kRound{25};
 constexpr std::chrono::milliseconds kProgress{1000};
 constexpr std::size_t kNotesMax = 8;
+/// HTTP says a uniform chunk's shares with six decimals.
+constexpr double kHttpShareTolerance = 1e-6;
 
 /// One run: all is on the calling thread but the checks.
 class LoadRun {
@@ -84,7 +86,8 @@ void LoadRun::sample(const ChunkAnswer& answer, std::span<const std::byte> paylo
 void LoadRun::take_world(const WorldAnswer& answer) {
     auto world = build_sent_world(answer, viewers_[0].client->hello()->fingerprint);
     if (world) {
-        check_ = std::make_unique<LocalCheck>(std::move(*world));
+        check_ = std::make_unique<LocalCheck>(
+            std::move(*world), options_.carrier == CarrierKind::http ? kHttpShareTolerance : 0.0);
     } else {
         note("nothing can be checked: " + world.error().message);
     }

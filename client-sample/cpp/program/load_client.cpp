@@ -193,6 +193,8 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
         if (const auto taken = take(**carried, Clock::now()); !taken) {
             return taken;
         }
+        const Bytes reply = carrier_->take_reply();
+        output_.insert(output_.end(), reply.begin(), reply.end());
     }
     const Bytes reply = carrier_->take_reply();
     output_.insert(output_.end(), reply.begin(), reply.end());

@@ -28,6 +28,7 @@ struct LoadFlags {
     std::string format = "draco";
     std::string by = "view";
     bool ws = false;
+    bool http = false;
     std::vector<double> at = {0, 0};
     double patience_seconds = 10;
     LoadOptions options;
@@ -62,7 +63,9 @@ Result<LoadOptions> understood(const LoadFlags& flags) {
     }
     options.host = address->host;
     options.port = address->port;
-    options.carrier = flags.ws ? CarrierKind::web_socket : CarrierKind::tcp;
+    options.carrier = flags.ws     ? CarrierKind::web_socket
+                      : flags.http ? CarrierKind::http
+                                   : CarrierKind::tcp;
     static const std::map<std::string, std::vector<MovementKind>> kMovements = {
         {"walk", {MovementKind::walk}},
         {"fly", {MovementKind::fly}},
@@ -83,7 +86,7 @@ Result<LoadOptions> understood(const LoadFlags& flags) {
     options.client.format = flags.format == "columns"  ? ChunkFormat::columns
                             : flags.format == "blocky" ? ChunkFormat::draco_blocky
                                                        : ChunkFormat::draco;
-    options.client.by_view = flags.by == "view";
+    options.client.by_view = flags.by == "view" && !flags.http;
     options.client.patience =
         std::chrono::milliseconds(static_cast<std::int64_t>(flags.patience_seconds * 1000));
     return options;
@@ -188,7 +191,11 @@ void add_load_command(CLI::App& app, int& exit_code) {
                      "Seconds over which clients come, one after the other")
         ->check(CLI::Range(0.0, 86400.0))
         ->capture_default_str();
-    load->add_flag("--ws", flags->ws, "Over WebSocket, at /ws of the server's HTTP address");
+    auto* ws =
+        load->add_flag("--ws", flags->ws, "Over WebSocket, at /ws of the server's HTTP address");
+    load->add_flag("--http", flags->http,
+                   "Over HTTP/1.1, a kept connection each: a GET a chunk, by key")
+        ->excludes(ws);
     add_what_clients_do(*load, *flags);
     load->add_option("--token", flags->options.client.token, "For a server that asks for one");
     load->add_option("--check", flags->options.check_every,

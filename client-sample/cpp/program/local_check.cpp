@@ -9,6 +9,7 @@
 #include "generator/volume/chunk_codec.h"
 #include "protocol/wire/column_payload.h"
 
+#include <cmath>
 #include <exception>
 #include <string>
 #include <utility>
@@ -28,14 +29,14 @@ tl::unexpected<Error> differs(const ChunkAnswer& answer, const std::string& what
                                         " differs from what is generated here: " + what);
 }
 
-bool is_same(const WireComposition& wire, const Composition& composition) {
+bool is_same(const WireComposition& wire, const Composition& composition, double tolerance) {
     const auto shares = composition.shares();
     if (wire.size() != shares.size()) {
         return false;
     }
     for (std::size_t i = 0; i < wire.size(); ++i) {
         if (wire[i].material != shares[i].material ||
-            wire[i].concentration != shares[i].concentration) {
+            std::abs(wire[i].concentration - shares[i].concentration) > tolerance) {
             return false;
         }
     }
@@ -99,8 +100,10 @@ struct ChunkChecker::Buffers {
     Bytes bytes;
 };
 
-ChunkChecker::ChunkChecker(std::shared_ptr<const World> world)
-    : world_(std::move(world)), buffers_(std::make_unique<Buffers>(*world_)) {}
+ChunkChecker::ChunkChecker(std::shared_ptr<const World> world, double share_tolerance)
+    : world_(std::move(world)),
+      share_tolerance_(share_tolerance),
+      buffers_(std::make_unique<Buffers>(*world_)) {}
 
 ChunkChecker::~ChunkChecker() = default;
 
@@ -113,7 +116,8 @@ Result<void> ChunkChecker::check(const ChunkAnswer& answer, std::span<const std:
     }
     cut_chunk(b.chunk, b.stack, key.y, grid.height);
     const bool is_uniform_right =
-        b.chunk.uniform && is_same(answer.uniform, b.chunk.uniform_content.composition);
+        b.chunk.uniform &&
+        is_same(answer.uniform, b.chunk.uniform_content.composition, share_tolerance_);
     if (answer.format == ChunkFormat::columns) {
         if (answer.status != ChunkStatus::full) {
             return is_uniform_right ? Result<void>()
@@ -154,8 +158,9 @@ Result<void> ChunkChecker::check(const ChunkAnswer& answer, std::span<const std:
     return difference.empty() ? Result<void>() : differs(answer, difference);
 }
 
-LocalCheck::LocalCheck(std::shared_ptr<const World> world)
-    : checker_(std::move(world)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+LocalCheck::LocalCheck(std::shared_ptr<const World> world, double share_tolerance)
+    : checker_(std::move(world), share_tolerance),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 LocalCheck::~LocalCheck() {
     {

@@ -35,13 +35,16 @@ Result<std::shared_ptr<const World>> build_sent_world(const WorldAnswer& answer,
 /// decoded before without a fault.
 class ChunkChecker {
   public:
-    explicit ChunkChecker(std::shared_ptr<const World> world);
+    /// Concentrations of uniform chunks may differ by `share_tolerance`: HTTP rounds them.
+    explicit ChunkChecker(std::shared_ptr<const World> world, double share_tolerance = 0);
     ~ChunkChecker();
+
     Result<void> check(const ChunkAnswer& answer, std::span<const std::byte> payload);
 
   private:
     struct Buffers;
     std::shared_ptr<const World> world_;
+    double share_tolerance_;
     std::unique_ptr<Buffers> buffers_;
 };
 
@@ -54,7 +57,7 @@ struct CheckCounts {
 /// A checker and its thread. `offer` and `counts` from any thread.
 class LocalCheck {
   public:
-    explicit LocalCheck(std::shared_ptr<const World> world);
+    explicit LocalCheck(std::shared_ptr<const World> world, double share_tolerance = 0);
     /// Drops what waits.
     ~LocalCheck();
 

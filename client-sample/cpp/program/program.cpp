@@ -1,6 +1,7 @@
 #include "client-sample/cpp/program/program.h"
 
 #include "client-sample/cpp/program/load.h"
+#include "client-sample/cpp/program/view.h"
 #include "protocol/base/command_line.h"
 
 #include <CLI/CLI.hpp>
@@ -38,13 +39,14 @@ std::vector<std::string> joined_arguments(int argc, const char* const* argv) {
 int run_client_program(int argc, const char* const* argv) {
     int exit_code = kClientDone;
     try {
-        CLI::App app("Fetches terrain from a Terrane server and checks what it got.",
+        CLI::App app("A client of Terrane servers: fetches, draws, and puts on load.",
                      "terrane-client");
         app.require_subcommand(1);
         app.set_version_flag("--version", TERRANE_VERSION);
-        app.footer("Try: terrane-client get --help");
+        app.footer("Try: terrane-client get --help, load --help, view --help");
         add_get_command(app, exit_code);
         add_load_command(app, exit_code);
+        add_view_command(app, exit_code);
         auto arguments = joined_arguments(argc, argv);
         if (const auto slip = unknown_subcommand(app, arguments)) {
             std::fprintf(stderr, "terrane-client: %s\n", slip->c_str());
