@@ -24,7 +24,7 @@ struct Overloaded : Cases... {
     using Cases::operator()...;
 };
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
     std::string out(1, '"');
     for (const char c : text) {
         out += c == '"' || c == '\\' ? "\\" : "";
@@ -50,7 +50,7 @@ Result<void> check_text(const Setting& setting, std::string_view text) {
     if (!setting.allowed.empty() &&
         std::ranges::find(setting.allowed, text) == setting.allowed.end()) {
         return fail(ErrorCode::invalid_argument,
-                    quoted(text) + " is not one of " + joined(setting.allowed));
+                    in_quotes(text) + " is not one of " + joined(setting.allowed));
     }
     return {};
 }
@@ -87,7 +87,8 @@ std::vector<Setting> all_settings() {
          .member = &Config::anonymous,
          .allowed = {"auto", "yes", "no"}},
         {.key = "viewer",
-         .help = "Folder with the viewer, served at /; without it a small page",
+         .help = "Folder with the viewer, served at /; empty: the one that came with the program, "
+                 "else a small page",
          .member = &Config::viewer,
          .is_path = true},
         {.key = "publish_world",
@@ -219,7 +220,7 @@ Result<void> set_value(ServerConfig& config, const Setting& setting, std::string
     }
     if (const auto* member = std::get_if<Setting::Flag>(&setting.member)) {
         if (text != "true" && text != "false") {
-            return fail(ErrorCode::invalid_argument, quoted(text) + " is not true or false");
+            return fail(ErrorCode::invalid_argument, in_quotes(text) + " is not true or false");
         }
         config.*(*member) = text == "true";
         return {};
@@ -229,7 +230,7 @@ Result<void> set_value(ServerConfig& config, const Setting& setting, std::string
     if (error != std::errc() || end != text.data() + text.size() || value < setting.least ||
         value > setting.most) {
         return fail(ErrorCode::invalid_argument,
-                    quoted(text) + " is not an integer within " + range_text(setting));
+                    in_quotes(text) + " is not an integer within " + range_text(setting));
     }
     config.*std::get<Setting::Number>(setting.member) = value;
     return {};
@@ -297,7 +298,8 @@ std::string config_toml(const ServerConfig& config) {
         }
         const bool is_text = std::holds_alternative<Setting::Text>(setting.member);
         const std::string value = value_text(config, setting);
-        out += "\n" + std::string(setting.key) + " = " + (is_text ? quoted(value) : value) + "\n";
+        out +=
+            "\n" + std::string(setting.key) + " = " + (is_text ? in_quotes(value) : value) + "\n";
     }
     return out;
 }

@@ -246,7 +246,7 @@ struct Server::Impl {
                .new_flow = [this] { return service.new_flow_id(); },
                .timeouts = options.http_timeouts,
                .websocket = websocket_upgrade(sessions),
-               .requests_log = &log} {
+               .requests_log = options.log_requests ? &log : nullptr} {
         add_chunk_routes(router, routes);
         add_world_routes(router, routes);
         add_state_routes(router, routes);

@@ -71,7 +71,11 @@ struct Connection::Socket {
         tls.emplace(socket, *tls_context);
         tls->set_verify_mode(asio::ssl::verify_peer, error);
         tls->set_verify_callback(asio::ssl::host_name_verification(host), error);
-        SSL_set_tlsext_host_name(tls->native_handle(), host.c_str());
+        error_code no_address;
+        asio::ip::make_address(host, no_address);
+        if (no_address) {  // a name, which the server may have one certificate of several for
+            SSL_set_tlsext_host_name(tls->native_handle(), host.c_str());
+        }
         error_code outcome = error;
         tls->async_handshake(asio::ssl::stream_base::client,
                              [&](error_code shaken) { outcome = shaken; });

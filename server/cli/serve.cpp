@@ -18,6 +18,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -144,6 +145,22 @@ Result<Endpoint> endpoint_of(const char* flag, const std::string& text) {
     return endpoint;
 }
 
+/// Where the viewer is, if nobody says: installed, or built in the source tree that this program
+/// was built in. Empty: nowhere.
+std::filesystem::path viewer_folder(const std::string& said) {
+    if (!said.empty()) {
+        return said;
+    }
+    std::error_code error;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+    for (const char* place : {"../share/terrane/viewer", "../../../client-sample/web/dist"}) {
+        if (std::filesystem::exists(program / place / "index.html", error)) {
+            return program / place;
+        }
+    }
+    return {};
+}
+
 /// All but the world.
 Result<ServerOptions> options_of(const ServerConfig& config) {
     ServerOptions options;
@@ -163,7 +180,7 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
         return fail(ErrorCode::invalid_argument, "--tls-cert and --tls-key belong together");
     }
     if (!config.tls_cert.empty()) {
-        options.tls = {.certificate = config.tls_cert, .key = config.tls_key};
+        options.tls = TlsServer::Files{.certificate = config.tls_cert, .key = config.tls_key};
     }
     options.token_file = config.tokens;
     if (config.anonymous != "auto") {
@@ -173,8 +190,8 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
         return fail(ErrorCode::invalid_argument,
                     "--anonymous no needs --tokens FILE, or nobody could come in");
     }
-    if (!config.viewer.empty()) {
-        auto files = read_viewer_files(config.viewer);
+    if (const auto viewer = viewer_folder(config.viewer); !viewer.empty() && options.http) {
+        auto files = read_viewer_files(viewer);
         if (!files) {
             return fail(files.error().code, "--viewer: " + files.error().message);
         }
@@ -186,6 +203,7 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
                     "--data DIR is needed: where chunks are kept (or use --store memory)");
     }
     options.data_directory = config.data;
+    options.log_requests = config.log_level == "debug";
     options.publish_world = config.publish_world;
     options.workers = config.workers;
     options.cache_bytes_max = config.cache_mib << 20U;

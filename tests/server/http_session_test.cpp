@@ -1,0 +1,232 @@
+// One HTTP connection without a socket: bytes in, bytes out, time stepped by hand.
+#include "server/net/http_session.h"
+
+#include "server/http/ask_service.h"
+#include "server/http/problem.h"
+#include "tests/server/gated_step.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+namespace terrane {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr ChunkKey kKey{.position = {.lod = 0, .x = 1, .y = 2, .z = 3}};
+
+/// A server with two routes: "/now" answers at once, "/chunk" asks a gated service.
+struct Fixture {
+    Fixture() {
+        gate.open = false;
+        gate.chunk.status = ChunkStatus::full;
+        gate.chunk.payload = http_body("payload");
+        service.emplace(ServiceOptions{.cache_bytes_max = std::size_t{1} << 20U}, counters,
+                        gate.maker());
+        router.add(
+            {.path = "/now",
+             .caching = HttpCaching::none,
+             .handler = [](const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
+                 respond(http_ok("text/plain", http_body("now")));
+             }});
+        router.add(
+            {.path = "/chunk",
+             .caching = HttpCaching::none,
+             .handler = [this](const HttpRequest& request, const RouteParams&,
+                               HttpRespond respond) {
+                 ask_service(
+                     *service, kKey, request,
+                     [respond = std::move(respond)](const Result<Answer>& answer) {
+                         respond(answer
+                                     ? http_ok("a/b", std::get<ServedChunk>(*answer).chunk->payload)
+                                     : http_problem(answer.error()));
+                     });
+             }});
+        session = std::make_shared<HttpSession>(
+            context, ConnectionOrigin{.id = 1, .address = "test"},
+            [this](std::function<void()> step) {
+                const MutexLock lock(mutex);
+                steps.push_back(std::move(step));
+            },
+            now);
+    }
+
+    void send(std::string_view text) { session->receive(bytes_of(text), now); }
+
+    void pass(std::chrono::milliseconds time) {
+        now += time;
+        session->tick(now);
+    }
+
+    /// What is to be written, written.
+    std::string output() {
+        std::string out;
+        Outbox::Gather parts;
+        while (const std::size_t count = session->gather(parts)) {
+            std::size_t size = 0;
+            for (std::size_t i = 0; i < count; ++i) {
+                out += text_of(parts[i]);
+                size += parts[i].size();
+            }
+            session->written(size, now);
+        }
+        return out;
+    }
+
+    /// Runs what workers have posted, once there is something.
+    void run_posted() {
+        while (true) {
+            std::vector<std::function<void()>> taken;
+            {
+                const MutexLock lock(mutex);
+                taken.swap(steps);
+            }
+            for (const auto& step : taken) {
+                step();
+            }
+            if (!taken.empty()) {
+                return;
+            }
+            std::this_thread::yield();
+        }
+    }
+
+    Gate gate;
+    ServiceCounters counters;
+    std::optional<ChunkService> service;
+    Router router{Hash128{}};
+    HttpCounters http_counters;
+    std::atomic<std::uint64_t> next_id = 1;
+    HttpContext context{.router = &router,
+                        .counters = &http_counters,
+                        .next_request_id = &next_id,
+                        .new_flow = [this] { return service->new_flow_id(); },
+                        .timeouts = {},
+                        .websocket = {},
+                        .requests_log = nullptr};
+    Mutex mutex;
+    std::vector<std::function<void()>> steps;
+    ByteProtocol::Clock::time_point now{};
+    std::shared_ptr<HttpSession> session;
+};
+
+constexpr std::string_view kNow = "GET /now HTTP/1.1\r\nHost: a\r\n\r\n";
+constexpr std::string_view kChunk = "GET /chunk HTTP/1.1\r\nHost: a\r\n\r\n";
+
+TEST(HttpSession, AnswersInTheStepThatReadTheRequestHoweverItIsCut) {
+    Fixture f;
+    for (std::size_t step = 1; step <= kNow.size(); ++step) {
+        for (std::size_t at = 0; at < kNow.size(); at += step) {
+            f.send(kNow.substr(at, step));
+        }
+        const std::string out = f.output();
+        EXPECT_THAT(out, StartsWith("HTTP/1.1 200 OK\r\n"));
+        EXPECT_TRUE(out.ends_with("\r\n\r\nnow")) << out;
+    }
+    EXPECT_FALSE(f.session->is_closing());
+}
+
+TEST(HttpSession, AnswersLaterOnItsOwnThreadAndTheNextOneAfterwards) {
+    Fixture f;
+    f.send(std::string(kChunk) + std::string(kNow));
+    f.gate.begun.acquire();
+    EXPECT_EQ(f.output(), "");
+    f.gate.passes.release();
+    f.run_posted();
+    const std::string out = f.output();
+    EXPECT_LT(out.find("\r\n\r\npayload"), out.find("\r\n\r\nnow"));
+    EXPECT_TRUE(out.ends_with("now"));
+}
+
+TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
+    for (const bool closes : {false, true}) {
+        Fixture f;
+        f.send(kChunk);
+        f.gate.begun.acquire();
+        EXPECT_EQ(f.service->in_flight(), 1U);
+        if (closes) {
+            f.session->end();
+        } else {
+            f.session->input_ended();
+        }
+        EXPECT_TRUE(f.session->is_dead());
+        EXPECT_EQ(f.service->in_flight(), 0U);
+        EXPECT_EQ(count_of(f.counters.cancelled), 1U);
+        f.gate.passes.release();
+    }
+}
+
+TEST(HttpSession, WhoWaitsForItsAnswerMayBeSilentForLong) {
+    Fixture f;
+    f.send(kChunk);
+    f.gate.begun.acquire();
+    f.pass(1h);
+    EXPECT_FALSE(f.session->is_closing() || f.session->is_dead());
+    f.gate.passes.release();
+    f.run_posted();
+    EXPECT_THAT(f.output(), HasSubstr("payload"));
+    f.pass(59s);
+    EXPECT_FALSE(f.session->is_closing());
+    f.pass(2s);
+    EXPECT_TRUE(f.session->is_closing());
+}
+
+TEST(HttpSession, ClosesOnSlowHeadersBodiesAndReaders) {
+    Fixture header;
+    header.send("GET /now HTTP/1.1\r\n");
+    for (int i = 0; i < 11; ++i) {
+        header.send("X: y\r\n");  // a line a second keeps nobody
+        header.pass(1s);
+    }
+    EXPECT_THAT(header.output(), StartsWith("HTTP/1.1 408 "));
+    EXPECT_TRUE(header.session->is_closing());
+
+    Fixture body;
+    body.send("POST /now HTTP/1.1\r\nHost: a\r\nContent-Length: 9\r\n\r\n");
+    body.pass(29s);
+    EXPECT_FALSE(body.session->is_closing());
+    body.pass(2s);
+    EXPECT_THAT(body.output(), StartsWith("HTTP/1.1 408 "));
+
+    Fixture reader;
+    reader.send(kNow);
+    reader.pass(1s);
+    reader.pass(29s);
+    EXPECT_FALSE(reader.session->is_dead());
+    reader.pass(2s);
+    EXPECT_TRUE(reader.session->is_dead());
+}
+
+TEST(HttpSession, StopsReadingWhenTheClientDoesNotRead) {
+    Fixture f;
+    std::size_t requests = 0;
+    while (f.session->wants_input() && requests < 100'000) {
+        f.send(kNow);
+        ++requests;
+    }
+    EXPECT_LT(requests, 2000U);
+    EXPECT_NE(f.output(), "");
+    EXPECT_TRUE(f.session->wants_input());
+}
+
+TEST(HttpSession, DrainingAnswersThenCloses) {
+    Fixture f;
+    f.send(kChunk);
+    f.gate.begun.acquire();
+    f.session->drain();
+    EXPECT_FALSE(f.session->is_closing());
+    f.gate.passes.release();
+    f.run_posted();
+    EXPECT_THAT(f.output(), HasSubstr("Connection: close\r\n"));
+    EXPECT_TRUE(f.session->is_closing());
+    Fixture idle;
+    idle.session->drain();
+    EXPECT_TRUE(idle.session->is_closing());
+}
+
+}  // namespace
+}  // namespace terrane
