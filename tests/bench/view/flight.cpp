@@ -35,6 +35,9 @@ class Flight {
                                        .timeout = std::chrono::seconds(20),
                                        .client_name = plan_.name,
                                        .token = {}});
+        if (plan_.connected) {
+            plan_.connected();
+        }
         if (!client) {
             figures_.error = client.error().message;
             return figures_;
@@ -44,7 +47,7 @@ class Flight {
             std::chrono::duration<double>(1 / plan_.updates_per_second));
         const auto end = begun_ + std::chrono::duration_cast<Clock::duration>(
                                       std::chrono::duration<double>(plan_.seconds));
-        for (auto due = begun_; Clock::now() < end && !(plan_.stop && *plan_.stop);) {
+        for (auto due = begun_; Clock::now() < end && !(plan_.until_complete && is_complete());) {
             if (const auto sent = client->view(look(Clock::now())); !sent) {
                 figures_.error = sent.error().message;
                 return figures_;
@@ -58,6 +61,8 @@ class Flight {
     }
 
   private:
+    bool is_complete() const { return figures_.complete_ms > 0; }
+
     /// Where the viewer is now, and what that makes wanted and unwanted.
     ViewUpdate look(Clock::time_point now) {
         const Place at = plan_.place(std::chrono::duration<double>(now - begun_).count());

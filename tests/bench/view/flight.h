@@ -32,10 +32,11 @@ struct FlightPlan {
     std::function<Place(double)> place;  ///< seconds since the start
     double seconds = 10;
     double updates_per_second = 20;
-    double read_bytes_per_second = 0;   ///< 0: as fast as it comes; else it pauses after a chunk
-    std::atomic<bool>* stop = nullptr;  ///< ends it early
+    double read_bytes_per_second = 0;  ///< 0: as fast as it comes; else it pauses after a chunk
     std::atomic<std::uint64_t>* received_bytes = nullptr;  ///< counted on, for who looks meanwhile
-    double settle_seconds = 0;  ///< of figures before this only bytes are kept
+    std::function<void()> connected = {};                  ///< called then; may wait for others
+    bool until_complete = false;  ///< end when nothing of the view is missing
+    double settle_seconds = 0;    ///< of figures before this only bytes are kept
 };
 
 struct FlightFigures {

@@ -14,11 +14,11 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <barrier>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <numbers>
 #include <set>
 #include <string>
 #include <thread>
@@ -176,6 +176,14 @@ void measure_flight(const Options& options, Report& report,
     std::map<ChunkPos, int> made;
     std::set<StackPos> stacks;
     int twice = 0;
+    double near_work_ms = 0;
+    for (const Build& build : server.builds()) {
+        if (build.key.lod == 0 && std::abs(build.key.x) <= 1 && std::abs(build.key.z) <= 1) {
+            near_work_ms +=
+                std::chrono::duration<double, std::milli>(build.ended - build.begun).count();
+        }
+    }
+    report.figure("flight: workers' time for the first near ring", near_work_ms, "ms");
     for (const Build& build : server.builds()) {
         stacks.insert(stack_of(build.key));
         twice += build.is_answer && ++made[build.key] > 1 ? 1 : 0;
@@ -188,18 +196,17 @@ void measure_flight(const Options& options, Report& report,
     report.bar("flight: chunks that came twice", static_cast<double>(figures.twice), 0, "");
 }
 
-/// One viewer goes all around, so that all of the area is in the cache.
-void heat(const ViewServer& server, const ViewWorld& world) {
-    for (const double phase : {0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0}) {
+/// One viewer stands here and there along the way, until all of the area is in the cache.
+void heat(const ViewServer& server, const ViewWorld& world, double seconds) {
+    for (double angle = 0; angle < 0.5 + 0.15 * seconds; angle += 0.25) {
         FlightPlan plan;
         plan.port = server.port();
         plan.name = "heater";
         plan.world = world;
-        // An eighth of the way round at ten times the speed, then the view is left to fill.
-        plan.place = [at = circle(phase)](double seconds) {
-            return at(std::min(seconds * 10, 10.0));
-        };
-        plan.seconds = 6;
+        plan.place = [at = circle(angle)](double) { return at(0); };
+        plan.seconds = 120;
+        plan.updates_per_second = 5;
+        plan.until_complete = true;
         check(fly(plan));
     }
 }
@@ -215,7 +222,7 @@ Crowd fly_together(const Options& options, const ViewServer& server, const ViewW
     Crowd crowd;
     crowd.figures.resize(options.viewers);
     std::vector<std::atomic<std::uint64_t>> received(options.viewers);
-    std::atomic<bool> stop = false;
+    std::barrier all_connected(static_cast<std::ptrdiff_t>(options.viewers));
     {
         std::vector<std::jthread> threads;
         for (std::size_t i = 0; i < options.viewers; ++i) {
@@ -227,7 +234,7 @@ Crowd fly_together(const Options& options, const ViewServer& server, const ViewW
                 plan.place = circle(0.01 * static_cast<double>(i));
                 plan.seconds = seconds;
                 plan.settle_seconds = settle_seconds;
-                plan.stop = &stop;
+                plan.connected = [&] { all_connected.arrive_and_wait(); };
                 plan.received_bytes = &received[i];
                 if (i == 0 && !slow_name.empty()) {
                     plan.name = slow_name;
@@ -236,16 +243,18 @@ Crowd fly_together(const Options& options, const ViewServer& server, const ViewW
                 crowd.figures[i] = fly(plan);
             });
         }
-        // Shares are looked at while everybody still wants more: after 4 MB for the fastest.
+        // Shares are looked at while everybody still wants more: a fifth of a view on average.
         constexpr std::uint64_t kLookAt = std::uint64_t{4} << 20U;
         const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
         while (Clock::now() < deadline && crowd.share_bytes.empty()) {
-            const bool is_time = std::ranges::any_of(
-                received, [](const auto& bytes) { return bytes.load() >= kLookAt; });
-            if (is_time) {
-                for (const auto& bytes : received) {
-                    crowd.share_bytes.push_back(static_cast<double>(bytes.load()));
-                }
+            std::vector<double> shares;
+            double sum = 0;
+            for (const auto& bytes : received) {
+                shares.push_back(static_cast<double>(bytes.load()));
+                sum += shares.back();
+            }
+            if (sum >= static_cast<double>(kLookAt * received.size())) {
+                crowd.share_bytes = std::move(shares);
             }
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
         }
@@ -257,10 +266,10 @@ void measure_crowd(const Options& options, Report& report,
                    const std::shared_ptr<const World>& world) {
     ViewServer server(world, options.workers, 1);
     const ViewWorld view_world = view_world_of(*world);
-    heat(server, view_world);
+    const double seconds = std::min(options.seconds, 20.0);
+    heat(server, view_world, seconds);
     const std::uint64_t before = count_of(server.counters().generations);
-    const Crowd crowd =
-        fly_together(options, server, view_world, std::min(options.seconds, 20.0), 0, "");
+    const Crowd crowd = fly_together(options, server, view_world, seconds, 0, "");
     std::vector<double> shares = crowd.share_bytes;
     std::vector<double> wanted_ms;
     std::uint64_t bytes = 0;
@@ -293,8 +302,8 @@ void measure_slow(const Options& options, Report& report,
                   const std::shared_ptr<const World>& world) {
     ViewServer server(world, options.workers, 1);
     const ViewWorld view_world = view_world_of(*world);
-    heat(server, view_world);
     const double seconds = std::clamp(options.seconds / 4, 4.0, 12.0);
+    heat(server, view_world, seconds);
     std::vector<double> p99[2];  // without, with
     std::size_t held_bytes = 0;
     for (int turn = 0; turn < 6; ++turn) {
