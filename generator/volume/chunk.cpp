@@ -1,21 +1,12 @@
-// Two passes over the stack's limits: the first copies each column's part and notes which palette
-// entries it uses, the second numbers these entries anew.
 #include "generator/volume/chunk.h"
 
 #include "protocol/base/check.h"
 
-#include <algorithm>
-#include <limits>
+#include <utility>
 #include <vector>
 
 namespace terrane {
 namespace {
-
-/// Floor and ceiling of the chunk in 1/256 voxel; a chunk with anything in it has lo < 2^31.
-struct Span256 {
-    std::int64_t lo = 0;
-    std::int64_t hi = 0;
-};
 
 void make_uniform(Chunk& out, const PaletteEntry& content) {
     out.uniform = true;
@@ -27,75 +18,24 @@ void make_uniform(Chunk& out, const PaletteEntry& content) {
     out.stack_palette_ids.clear();
 }
 
-std::uint16_t void_id_of(const Palette& palette) {
-    const auto found = std::find_if(palette.begin(), palette.end(), [](const PaletteEntry& entry) {
-        return entry.kind == PaletteKind::void_;
-    });
-    TERRANE_ASSERT(found != palette.end());
-    return static_cast<std::uint16_t>(found - palette.begin());
-}
-
-/// Appends the last limit at or below lo, those between, and the first at or above hi; the void at
-/// hi where nothing is that high.
-void append_cut(Limits& out, std::span<const Limit> column, Span256 span, std::uint16_t void_id) {
-    TERRANE_ASSERT(!column.empty());
-    std::size_t first = 0;
-    while (first + 1 < column.size() && column[first + 1].y256 <= span.lo) {
-        ++first;
-    }
-    std::size_t end = first + 1;
-    while (end < column.size() && column[end].y256 < span.hi) {
-        ++end;
-    }
-    const bool closed = end < column.size();
-    const auto part = column.subspan(first, end - first + (closed ? 1 : 0));
-    out.insert(out.end(), part.begin(), part.end());
-    if (!closed) {
-        const std::int64_t y256 =
-            std::min<std::int64_t>(span.hi, std::numeric_limits<std::int32_t>::max());
-        out.push_back({.y256 = static_cast<std::int32_t>(y256), .palette_id = void_id, .flow = {}});
-    }
-}
-
-/// Copies every column's part with the stack's palette ids.
-void cut_columns(Chunk& out, const Stack& stack, Span256 span, std::uint16_t void_id) {
-    ColumnGrid& columns = out.columns;
-    columns.x_first = columns.z_first = 0;
-    columns.width = columns.length = stack.side;
-    columns.limits.clear();
-    columns.offsets.clear();
-    columns.offsets.push_back(0);
+/// The whole columns of a level above 0, without the apron.
+void copy_columns(ColumnGrid& out, const Stack& stack) {
+    out.x_first = out.z_first = 0;
+    out.width = out.length = stack.side;
+    out.limits.clear();
+    out.offsets.assign(1, 0);
     for (std::int32_t z = 0; z < stack.side; ++z) {
         for (std::int32_t x = 0; x < stack.side; ++x) {
             const auto column = stack.columns.column(x, z);
-            if (stack.position.lod == 0) {
-                append_cut(columns.limits, column, span, void_id);
-            } else {  // the whole height at once
-                columns.limits.insert(columns.limits.end(), column.begin(), column.end());
-            }
-            columns.offsets.push_back(static_cast<std::uint32_t>(columns.limits.size()));
+            out.limits.insert(out.limits.end(), column.begin(), column.end());
+            out.offsets.push_back(static_cast<std::uint32_t>(out.limits.size()));
         }
     }
-}
-
-/// Whether all limits show one content: equal compositions, whatever their ids.
-bool is_uniform(std::span<const Limit> limits, const Palette& palette) {
-    const PaletteEntry& content = palette[limits[0].palette_id];
-    std::uint16_t equal_id = limits[0].palette_id;
-    for (const Limit& limit : limits) {
-        if (limit.palette_id != equal_id) {
-            if (palette[limit.palette_id] != content) {
-                return false;
-            }
-            equal_id = limit.palette_id;
-        }
-    }
-    return true;
 }
 
 /// Keeps the entries in use, in ascending stack id, and points the limits at them.
-void localize_palette(Chunk& out, const Palette& palette) {
-    std::vector<std::uint16_t> local_ids(palette.size(), 0);
+void localize_palette(Chunk& out, const Palette& palette, std::vector<std::uint16_t>& local_ids) {
+    local_ids.assign(palette.size(), 0);
     for (const Limit& limit : out.columns.limits) {
         local_ids[limit.palette_id] = 1;
     }
@@ -108,6 +48,9 @@ void localize_palette(Chunk& out, const Palette& palette) {
             out.stack_palette_ids.push_back(static_cast<std::uint16_t>(id));
         }
     }
+    if (out.stack_palette_ids.back() + std::size_t{1} == out.palette.size()) {
+        return;  // none is left out below the last: the numbers are the same
+    }
     for (Limit& limit : out.columns.limits) {
         limit.palette_id = local_ids[limit.palette_id];
     }
@@ -115,32 +58,41 @@ void localize_palette(Chunk& out, const Palette& palette) {
 
 }  // namespace
 
-void cut_chunk(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height) {
+void ChunkCutter::cut(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height) {
     TERRANE_ASSERT(stack.side > 0 && height > 0 && (stack.position.lod == 0 || y == 0));
     TERRANE_ASSERT(!stack.palette.empty());
     out.position = {
         .lod = stack.position.lod, .x = stack.position.x, .y = y, .z = stack.position.z};
     out.side = stack.side;
     out.height = height;
-    const std::int64_t chunk_units = std::int64_t{height} * kUnitsPerVoxel;
-    const Span256 span = {.lo = y * chunk_units, .hi = (y + std::int64_t{1}) * chunk_units};
-    const std::uint16_t void_id = void_id_of(stack.palette);
     if (y < 0) {
         make_uniform(out, stack.palette[0]);  // The base goes down for ever.
         return;
     }
-    if (span.lo >= stack.highest_y256) {
-        make_uniform(out, stack.palette[void_id]);
-        return;
-    }
-    cut_columns(out, stack, span, void_id);
-    if (is_uniform(out.columns.limits, stack.palette)) {
-        make_uniform(out, stack.palette[out.columns.limits[0].palette_id]);
-        return;
+    if (stack.position.lod > 0) {
+        copy_columns(out.columns, stack);
+        if (is_uniform(out.columns.limits, stack.palette)) {
+            make_uniform(out, stack.palette[out.columns.limits[0].palette_id]);
+            return;
+        }
+    } else {
+        cut_.resize(1);
+        std::swap(cut_[0].columns, out.columns);  // the caller's memory is used, not this one's
+        columns_.cut(cut_, stack.columns, stack.palette,
+                     {.x0 = 0, .z0 = 0, .side = stack.side, .height = height, .first_y = y});
+        std::swap(cut_[0].columns, out.columns);
+        if (cut_[0].uniform) {
+            make_uniform(out, stack.palette[cut_[0].content_id]);
+            return;
+        }
     }
     out.uniform = false;
     out.uniform_content = {};
-    localize_palette(out, stack.palette);
+    localize_palette(out, stack.palette, local_ids_);
+}
+
+void cut_chunk(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height) {
+    ChunkCutter().cut(out, stack, y, height);
 }
 
 }  // namespace terrane

@@ -5,12 +5,14 @@
 // is one composition throughout is `uniform` and has no columns.
 #pragma once
 
+#include "generator/volume/cut_columns.h"
 #include "generator/volume/limit.h"
 #include "generator/volume/stack.h"
 #include "generator/world/composition.h"
 #include "protocol/base/coords.h"
 
 #include <cstdint>
+#include <vector>
 
 namespace terrane {
 
@@ -27,6 +29,19 @@ struct Chunk {
     std::vector<std::uint16_t> stack_palette_ids;  ///< id in the stack of each palette entry
 
     friend bool operator==(const Chunk&, const Chunk&) = default;
+};
+
+/// Cuts chunk after chunk without allocating anything but what they grow. One thread's; its
+/// contents never change results.
+class ChunkCutter {
+  public:
+    /// As cut_chunk, below.
+    void cut(Chunk& out, const Stack& stack, std::int32_t y, std::int32_t height);
+
+  private:
+    ColumnCutter columns_;
+    std::vector<ChunkLimits> cut_;
+    std::vector<std::uint16_t> local_ids_;
 };
 
 /// Cuts the chunk at height `y` (in chunk heights, any int32) out of `stack`. `out` is overwritten;

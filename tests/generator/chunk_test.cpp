@@ -1,11 +1,17 @@
 #include "generator/volume/chunk.h"
 
+#include "generator/terrain/generate_stack.h"
+#include "generator/volume/cut_columns.h"
 #include "tests/support/drawn_stack.h"
+#include "tests/support/test_world.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {
@@ -139,6 +145,64 @@ TEST(Chunk, HeightsAtTheEndOfInt32DoNotOverflow) {
     ASSERT_FALSE(chunk.uniform);
     EXPECT_THAT(heights_of(chunk.columns.column(0, 0)), ElementsAre(0, kMost, kMost, kMost));
 }
+
+/// A chunk's limits with the compositions that they show, and nothing of who numbers them how.
+std::vector<std::pair<Limit, PaletteEntry>> shown(const ColumnGrid& columns,
+                                                  const Palette& palette) {
+    std::vector<std::pair<Limit, PaletteEntry>> limits;
+    for (Limit limit : columns.limits) {
+        const PaletteEntry& entry = palette[limit.palette_id];
+        limit.palette_id = 0;
+        limits.emplace_back(limit, entry);
+    }
+    return limits;
+}
+
+class CutAtOnce : public testing::TestWithParam<std::string> {};
+
+TEST_P(CutAtOnce, AllChunksOfARectangleAreThoseOfItsStacks) {
+    const auto world = load_test_world(GetParam());
+    const std::int32_t side = world->definition.grid.side;
+    const std::int32_t height = world->definition.grid.height;
+    const std::int32_t squares = 100 / side;
+    StackGenerator generator(*world);
+    ColumnCutter cutter;
+    ColumnSet set;
+    Stack stack;
+    Chunk chunk;
+    std::vector<ChunkLimits> cut_at_once;
+    for (const std::int64_t first : {-3, 0, 40}) {
+        ASSERT_TRUE(generator.generate(
+            set, {.x0 = first * side, .z0 = 0, .width = squares * side, .length = side}));
+        const std::int32_t count = set.highest_y256 / (height * kUnitsPerVoxel) + 2;
+        for (std::int32_t x = 0; x < squares; ++x) {
+            cutter.cut(cut_at_once, set.columns, set.palette,
+                       {.x0 = x * side, .z0 = 0, .side = side, .height = height, .count = count});
+            ASSERT_TRUE(generator.generate(
+                stack, {.lod = 0, .x = static_cast<std::int32_t>(first) + x, .z = 0}));
+            for (std::int32_t y = 0; y < count; ++y) {
+                cut_chunk(chunk, stack, y, height);
+                const ChunkLimits& other = cut_at_once[static_cast<std::size_t>(y)];
+                ASSERT_EQ(other.uniform, chunk.uniform);
+                if (chunk.uniform) {
+                    EXPECT_EQ(set.palette[other.content_id], chunk.uniform_content);
+                    continue;
+                }
+                ASSERT_EQ(other.columns.offsets, chunk.columns.offsets);
+                ASSERT_EQ(shown(other.columns, set.palette), shown(chunk.columns, chunk.palette));
+            }
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Worlds, CutAtOnce,
+                         testing::Values("paper-B3-seed42", "dense-seed43", "edge-dense",
+                                         "edge-pinch", "edge-deep"),
+                         [](const auto& world) {
+                             std::string name(world.param);
+                             std::erase(name, '-');
+                             return name;
+                         });
 
 TEST(Chunk, ReusedBuffersLeaveNothingBehind) {
     const Stack stack = drawn_stack(4, {"aaB#bb", "aaA#bb"});
