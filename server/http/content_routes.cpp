@@ -214,6 +214,8 @@ void add_tiles3d_routes(Router& router, const RouteContext& context) {
     router.add_versioned(
         {.path = "/3dtiles/explicit/tileset.json",
          .handler = fixed(kJsonType, explicit_tileset_json(shape, {}).value_or(std::string()))});
+    router.add_versioned({.path = "/3dtiles/explicit/tileset-geo.json",
+                          .handler = fixed(kJsonType, explicit_tileset_geo_json(shape))});
     router.add_versioned({.path = "/3dtiles/explicit/{level}/{x}/{y}.json",
                           .handler = document(shape, std::string(kJsonType), explicit_bytes)});
 }

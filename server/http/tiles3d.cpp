@@ -84,6 +84,10 @@ struct Links {
     std::string tilesets;
 };
 
+Links first_links() {
+    return {.content = "../content/", .tilesets = ""};
+}
+
 Json explicit_tile(const TilesetShape& shape, const TileIndex& tile, std::int32_t levels,
                    const Links& links) {
     Json json = {{"boundingVolume", box_of(shape, tile)},
@@ -167,9 +171,15 @@ Result<std::string> explicit_tileset_json(const TilesetShape& shape, const TileI
         return tl::unexpected(checked.error());
     }
     const Links links = tile.level == 0
-                            ? Links{.content = "../content/", .tilesets = ""}
+                            ? first_links()
                             : Links{.content = "../../../content/", .tilesets = "../../"};
     return document(shape, tile.level, explicit_tile(shape, tile, kSubtreeLevels, links));
+}
+
+std::string explicit_tileset_geo_json(const TilesetShape& shape) {
+    Json root = explicit_tile(shape, {}, kSubtreeLevels, first_links());
+    root["transform"] = kAtLongitude0Latitude0;
+    return document(shape, 0, std::move(root));
 }
 
 }  // namespace terrane

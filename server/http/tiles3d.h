@@ -63,4 +63,7 @@ Result<Bytes> subtree_of(const TilesetShape& shape, const TileIndex& tile);
 /// with `out_of_range` where no subtree begins.
 Result<std::string> explicit_tileset_json(const TilesetShape& shape, const TileIndex& tile);
 
+/// The first explicit tileset laid on the globe; it links to the same ones below.
+std::string explicit_tileset_geo_json(const TilesetShape& shape);
+
 }  // namespace terrane

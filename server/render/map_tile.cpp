@@ -1,6 +1,7 @@
 #include "server/render/map_tile.h"
 
 #include "generator/volume/color.h"
+#include "generator/volume/water.h"
 #include "server/render/relief.h"
 
 #include <algorithm>
@@ -23,12 +24,50 @@ struct Patch {
 };
 
 /// The highest limit that shows something solid; the base always is.
-const Limit& top_of(std::span<const Limit> column, const Palette& palette) {
+std::size_t top_of(std::span<const Limit> column, const Palette& palette) {
     std::size_t i = column.size() - 1;
     while (i > 0 && !palette[column[i].palette_id].is_solid()) {
         --i;
     }
-    return column[i];
+    return i;
+}
+
+float voxels_of(const Limit& limit) {
+    return static_cast<float>(limit.y256) / static_cast<float>(kUnitsPerVoxel);
+}
+
+/// What is seen of the ground through water of this depth: the bed shows where it is shallow, and
+/// deep water is darker.
+LinearColor under_water(LinearColor bed, LinearColor water, float depth_voxels) {
+    constexpr float kClear = 3;  // voxels after which a quarter of the bed's light is left
+    constexpr float kDeep = 40;  // voxels after which the water itself has lost a fifth
+    const float share = kClear / (kClear + depth_voxels);
+    const float bed_share = share * share * 0.8F;
+    const float water_share = (1 - bed_share) * (0.6F + 0.4F * kDeep / (kDeep + depth_voxels));
+    return {.r = bed.r * bed_share * 0.8F + water.r * water_share,
+            .g = bed.g * bed_share * 0.95F + water.g * water_share,
+            .b = bed.b * bed_share + water.b * water_share};
+}
+
+struct Seen {
+    float height = 0;
+    LinearColor color;
+};
+
+/// The ground, or the water that stands over it.
+Seen seen_from_above(std::span<const Limit> column, const Palette& palette,
+                     std::span<const LinearColor> colors, std::span<const Material> materials) {
+    const std::size_t top = top_of(column, palette);
+    const float ground = voxels_of(column[top]);
+    const LinearColor bed = colors[column[top].palette_id];
+    for (std::size_t i = column.size() - 1; i-- > top + 1;) {
+        const std::uint16_t id = column[i].palette_id;
+        const float surface = voxels_of(column[i + 1]);
+        if (surface > ground && is_water(palette[id], materials)) {
+            return {.height = surface, .color = under_water(bed, colors[id], surface - ground)};
+        }
+    }
+    return {.height = ground, .color = bed};
 }
 
 void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
@@ -36,10 +75,11 @@ void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
     const std::vector<LinearColor> colors = palette_colors(set.palette, materials);
     for (std::int32_t z = 0; z < patch.length; ++z) {
         for (std::int32_t x = 0; x < patch.width; ++x) {
-            const Limit& top = top_of(set.columns.column(x, z), set.palette);
+            const Seen seen =
+                seen_from_above(set.columns.column(x, z), set.palette, colors, materials);
             const std::size_t at = relief.index_of(patch.x + x, patch.y + z);
-            relief.heights[at] = static_cast<float>(top.y256) / static_cast<float>(kUnitsPerVoxel);
-            relief.colors[at] = colors[top.palette_id];
+            relief.heights[at] = seen.height;
+            relief.colors[at] = seen.color;
         }
     }
 }

@@ -42,6 +42,10 @@ TEST(Tiles3d, TheGeoTilesetIsTheSameLaidOnTheGlobe) {
               Json({0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 6378137, 0, 0, 1}));
     geo["root"].erase("transform");
     EXPECT_EQ(geo, Json::parse(tileset_json(kShape)));
+    Json first = Json::parse(explicit_tileset_geo_json(kShape));
+    EXPECT_EQ(first["root"]["transform"][12], 6378137);
+    first["root"].erase("transform");
+    EXPECT_EQ(first, Json::parse(explicit_tileset_json(kShape, {}).value()));
 }
 
 TEST(Tiles3d, TilesAreStacksAroundTheOrigin) {

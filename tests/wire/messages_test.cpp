@@ -131,13 +131,13 @@ TEST(Messages, FormatsAre0To2AndOthersUnsupported) {
         });
     };
     for (const ChunkFormat format :
-         {ChunkFormat::draco, ChunkFormat::columns, ChunkFormat::draco_blocky}) {
+         {ChunkFormat::draco, ChunkFormat::columns, ChunkFormat::draco_blocky, ChunkFormat::glb}) {
         const auto message = request_of(static_cast<int>(format));
         ASSERT_TRUE(message) << message.error().message;
         EXPECT_EQ(std::get<ChunkRequest>(*message).format, format);
         EXPECT_NE(to_string(format), "unknown");
     }
-    for (const int format : {3, 200, 255}) {
+    for (const int format : {4, 200, 255}) {
         EXPECT_EQ(code_of(request_of(format)), ErrorCode::unsupported) << format;
     }
 }
