@@ -1,6 +1,7 @@
 #include "server/render/map_tile.h"
 
 #include "generator/volume/color.h"
+#include "generator/volume/water.h"
 #include "server/render/relief.h"
 
 #include <algorithm>
@@ -22,10 +23,12 @@ struct Patch {
     std::int32_t length = 0;
 };
 
-/// The highest limit that shows something solid; the base always is.
-const Limit& top_of(std::span<const Limit> column, const Palette& palette) {
+/// The highest limit that shows something solid or water; the base always is.
+const Limit& top_of(std::span<const Limit> column, const Palette& palette,
+                    std::span<const Material> materials) {
     std::size_t i = column.size() - 1;
-    while (i > 0 && !palette[column[i].palette_id].is_solid()) {
+    while (i > 0 && !palette[column[i].palette_id].is_solid() &&
+           !is_water(palette[column[i].palette_id], materials)) {
         --i;
     }
     return column[i];
@@ -36,7 +39,7 @@ void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
     const std::vector<LinearColor> colors = palette_colors(set.palette, materials);
     for (std::int32_t z = 0; z < patch.length; ++z) {
         for (std::int32_t x = 0; x < patch.width; ++x) {
-            const Limit& top = top_of(set.columns.column(x, z), set.palette);
+            const Limit& top = top_of(set.columns.column(x, z), set.palette, materials);
             const std::size_t at = relief.index_of(patch.x + x, patch.y + z);
             relief.heights[at] = static_cast<float>(top.y256) / static_cast<float>(kUnitsPerVoxel);
             relief.colors[at] = colors[top.palette_id];

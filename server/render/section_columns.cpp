@@ -1,6 +1,7 @@
 #include "server/render/section_columns.h"
 
 #include "generator/volume/color.h"
+#include "generator/volume/water.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -63,10 +64,12 @@ SeenColumn seen(std::span<const Limit> column, const Palette& palette, const Wor
     out.reserve(column.size());
     for (const Limit& limit : column) {
         const PaletteEntry& entry = palette[limit.palette_id];
-        out.push_back({.y = static_cast<float>(limit.y256) / static_cast<float>(kUnitsPerVoxel),
-                       .kind = entry.kind,
-                       .sort = sort_of(entry, limit.palette_id, world.stack.layers.size()),
-                       .color = color_of(entry.composition.shares(), world.definition.materials)});
+        out.push_back(
+            {.y = static_cast<float>(limit.y256) / static_cast<float>(kUnitsPerVoxel),
+             // Water shows its own colour, which caves do not.
+             .kind = is_water(entry, world.definition.materials) ? PaletteKind::vein : entry.kind,
+             .sort = sort_of(entry, limit.palette_id, world.stack.layers.size()),
+             .color = color_of(entry.composition.shares(), world.definition.materials)});
     }
     return out;
 }
