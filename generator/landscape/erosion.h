@@ -47,11 +47,12 @@ struct ErosionConstants {
 struct ErosionBuffers {
     std::vector<float> floats;
     std::vector<float> points;
+    std::vector<std::int64_t> cells;
 };
 
 /// coarse[i], fine[i]: what the filter adds to column i, in voxels, before it is scaled by how
 /// mountainous the land is. The slopes of `relief` are used up.
 void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConstants& constants,
-           const RectangleShape& shape, ErosionBuffers& buffers);
+           const RectangleShape& shape, const RowKernels& kernels, ErosionBuffers& buffers);
 
 }  // namespace terrane

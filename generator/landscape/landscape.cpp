@@ -83,7 +83,7 @@ void Landscape::build_fields(const ColumnRectangle& rectangle, const Region& reg
     }
     relief_builder_.build(relief_, constants_.relief, field_, kernels, noise_);
     if (relief_.has_rivers) {
-        erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, erosion_);
+        erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
     } else {
         std::fill(raw_.begin(), raw_.end(), constants_.erosion.coarse_amplitude);
         std::fill(fine_.begin(), fine_.end(), 0.0F);

@@ -84,6 +84,115 @@ std::int64_t signed_seed(const World& world) {
     return static_cast<std::int64_t>(world.definition.seed);
 }
 
+/// "12", "2.5": as short as it can be said.
+std::string short_text(double value) {
+    std::array<char, 64> buffer{};
+    const int size = std::snprintf(buffer.data(), buffer.size(), "%.4g", value);
+    return {buffer.data(), static_cast<std::size_t>(std::clamp(size, 0, 63))};
+}
+
+std::string percent_text(double share) {
+    return fixed_text(share * 100, 0) + " %";
+}
+
+std::string structure_text(const StructureParameters& structure) {
+    std::string text;
+    if (structure.fold > 0) {
+        text += "layers bent into folds about " + short_text(2 * structure.fold) +
+                " voxels high, a crest every " + short_text(structure.fold_length) + " columns; ";
+    }
+    if (structure.fault_density > 0) {
+        text += "about " + short_text(structure.fault_density) +
+                " fractures in 512 x 512 columns, slipped by up to " +
+                short_text(structure.fault_throw) + " voxels";
+        text += structure.sheet > 0
+                    ? ", some filled up to " + short_text(structure.sheet) + " thick; "
+                    : "; ";
+    }
+    text += text.empty() ? "layers lie as they were laid down; " : "";
+    return text + (structure.lift ? "veins lift what is above them"
+                                  : "veins lie in the rock without lifting it");
+}
+
+std::string relief_text(const ReliefParameters& relief) {
+    if (relief.height <= 0) {
+        return "none: the ground is the top of the stack";
+    }
+    const double low = relief.ground - relief.fall;
+    std::string text = "crests up to " + short_text(relief.height) +
+                       " voxels over rivers, a valley every " + short_text(relief.valley) +
+                       " columns, rivers between heights " + short_text(std::max(0.0, low)) +
+                       " and " + short_text(relief.ground + relief.fall) +
+                       ", plains and mountains " + short_text(relief.province) + " columns apart";
+    text += relief.plateau >= 0.5 ? "; table lands" : "; ridges";
+    if (relief.rivers > 0) {
+        text += "; rivers some " + short_text(2 * relief.rivers) + " columns wide and more";
+    }
+    if (relief.gullies > 0) {
+        text += "; gullies " + short_text(relief.gullies) + " deep";
+    }
+    if (relief.cliffs > 0) {
+        text += "; hard layers stand as cliffs";
+        text += relief.overhang > 0
+                    ? " and lean out up to " + std::to_string(relief.overhang) + " columns"
+                    : "";
+    }
+    if (relief.soil > 0) {
+        text += "; up to " + short_text(relief.soil) + " of soil";
+    }
+    if (relief.sea_level) {
+        text += "; the sea stands at " + short_text(*relief.sea_level);
+    }
+    if (relief.snow_line) {
+        text += "; snow from " + short_text(*relief.snow_line) + " up";
+    }
+    return text;
+}
+
+std::string caves_text(const CaveParameters& caves) {
+    if (caves.cell == 0) {
+        return "none but those between the layers";
+    }
+    return "a place for a node every " + std::to_string(caves.cell) + " columns on up to " +
+           std::to_string(caves.levels) + " soluble layers, taken with " +
+           percent_text(caves.density) + "; tubes to neighbours with " +
+           percent_text(caves.connect) + ", shafts upwards with " + percent_text(caves.shaft) +
+           ", chambers with " + percent_text(caves.chamber) + ", openings to the sky with " +
+           percent_text(caves.sink) + "; flooded from " + short_text(caves.water_table) +
+           " voxels below the rivers down";
+}
+
+Json landscape_json(const WorldDefinition& definition) {
+    const StructureParameters& structure = definition.structure;
+    const ReliefParameters& relief = definition.relief;
+    const CaveParameters& caves = definition.caves;
+    Json json = {
+        {"structure",
+         {{"fold", structure.fold},
+          {"fold_length", structure.fold_length},
+          {"fault_density", structure.fault_density},
+          {"fault_throw", structure.fault_throw},
+          {"sheet", structure.sheet},
+          {"lift", structure.lift}}},
+        {"relief",
+         {{"height", relief.height},
+          {"ground", relief.ground},
+          {"fall", relief.fall},
+          {"valley", relief.valley},
+          {"rivers", relief.rivers},
+          {"cliffs", relief.cliffs},
+          {"overhang", relief.overhang},
+          {"soil", relief.soil}}},
+        {"caves", {{"cell", caves.cell}, {"radius", caves.radius}, {"levels", caves.levels}}}};
+    if (relief.sea_level) {
+        json["relief"]["sea_level"] = *relief.sea_level;
+    }
+    if (relief.snow_line) {
+        json["relief"]["snow_line"] = *relief.snow_line;
+    }
+    return json;
+}
+
 }  // namespace
 
 std::string world_report_text(const World& world) {
@@ -109,6 +218,11 @@ std::string world_report_text(const World& world) {
                             std::to_string(total(stack.origin_caves)) + " caves");
     line("other plots", "0.5 to 1.5 times " + fixed_text(stack.reference_veins, 2) + " veins, " +
                             fixed_text(stack.reference_caves, 2) + " caves");
+    if (definition.format >= 2) {
+        line("structure", structure_text(definition.structure));
+        line("relief", relief_text(definition.relief));
+        line("cave systems", caves_text(definition.caves));
+    }
     out +=
         "\nLayers, the surface on top; lengths in voxels; veins and caves: of the origin plot, on\n"
         "top of the layer.\n";
@@ -128,7 +242,7 @@ std::string world_report_json(const World& world) {
                           {"alone", layer.alone},
                           {"composition", composition_json(world, layer.composition)}});
     }
-    const Json report = {
+    Json report = {
         {"name", definition.name},
         {"seed", signed_seed(world)},
         {"fingerprint", to_hex(world.fingerprint)},
@@ -146,6 +260,9 @@ std::string world_report_json(const World& world) {
           {"caves_by_gap", stack.origin_caves}}},
         {"reference", {{"veins", stack.reference_veins}, {"caves", stack.reference_caves}}},
         {"layers", layers}};
+    if (definition.format >= 2) {
+        report["landscape"] = landscape_json(definition);
+    }
     return report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

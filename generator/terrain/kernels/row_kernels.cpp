@@ -322,6 +322,84 @@ void element_tile(float* __restrict thickness, float x, float z, float step,
     }
 }
 
+float absolute(float x) {
+    return x < 0.0F ? -x : x;
+}
+
+/// Sine of -0.5..0.5 turns.
+float sine(float t) {
+    const float y = 8.0F * t - 16.0F * t * absolute(t);
+    return 0.225F * (y * absolute(y) - y) + y;
+}
+
+/// The stripes around a block's random points: three sums over them.
+struct Stripes {
+    float cosine[kBlock];
+    float sine[kBlock];
+    float weight[kBlock];
+};
+
+void add_stripes(Stripes& stripes, const ErosionRow& row, std::int32_t first, std::int32_t point,
+                 const float* side_x, const float* side_z) {
+    const float* const px = row.points + point * row.plane + first;
+    const float* const pz = px + kErosionPoints * row.plane;
+    const float* const fx = row.fraction_x + first;
+    for (std::int32_t i = 0; i < kBlock; ++i) {
+        const float vx = fx[i] - px[i];
+        const float vz = row.fraction_z - pz[i];
+        const float rest = 1.0F - (vx * vx + vz * vz) * (1.0F / 1.5625F);
+        const float k = rest > 0.0F ? rest * rest : 0.0F;
+        const float phase = 0.75F * (vx * side_x[i] + vz * side_z[i]);
+        // Below one turn where k is not 0: a shift by half a turn at most each way.
+        const float turn = phase > 0.5F ? phase - 1.0F : phase < -0.5F ? phase + 1.0F : phase;
+        stripes.cosine[i] += k * sine(0.25F - absolute(turn));
+        stripes.sine[i] += k * sine(turn);
+        stripes.weight[i] += k;
+    }
+}
+
+void erode(const ErosionRow& row) {
+    for (std::int32_t first = 0; first < row.count; first += kBlock) {
+        float side_x[kBlock];
+        float side_z[kBlock];
+        float* const slope_x = row.slope_x + first;
+        float* const slope_z = row.slope_z + first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float x = slope_x[i];
+            const float z = slope_z[i];
+            const float inverse = 1.0F / __builtin_sqrtf(x * x + z * z + 1e-12F);
+            side_x[i] = -z * inverse;
+            side_z[i] = x * inverse;
+        }
+        Stripes stripes = {};
+        for (std::int32_t point = 0; point < kErosionPoints; ++point) {
+            add_stripes(stripes, row, first, point, side_x, side_z);
+        }
+        float* const mask = row.mask + first;
+        float* const fade_of = row.fade + first;
+        float* const sum = row.sum + first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float inverse = 1.0F / (stripes.weight[i] + 1e-9F);
+            const float c0 = stripes.cosine[i] * inverse;
+            const float s0 = stripes.sine[i] * inverse;
+            const float length = __builtin_sqrtf(c0 * c0 + s0 * s0);
+            const float strength = 1.0F / (length > 0.5F ? length : 0.5F);
+            const float c = c0 * strength;
+            const float s = s0 * strength;
+            const float m = mask[i];
+            const float delta = fade_of[i] + m * (c - fade_of[i]);
+            sum[i] += row.amplitude * delta;
+            fade_of[i] = delta;
+            const float rest = 1.0F - m;
+            const float open = 1.0F - clamp01(1.4F * absolute(s));
+            mask[i] = (1.0F - rest * __builtin_sqrtf(rest)) * (1.0F - open * open);
+            const float turn = s < 0.0F ? row.steepening : -row.steepening;
+            slope_x[i] += turn * side_x[i];
+            slope_z[i] += turn * side_z[i];
+        }
+    }
+}
+
 }  // namespace
 
 extern const RowKernels kKernels;
@@ -332,6 +410,7 @@ const RowKernels kKernels = {.gradients = gradients,
                              .quantise = quantise,
                              .blends = blends,
                              .plain_columns = plain_columns,
-                             .element_tile = element_tile};
+                             .element_tile = element_tile,
+                             .erode = erode};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -74,6 +74,27 @@ struct PlainRow {
     std::int32_t layers = 0;
 };
 
+/// One octave of a landscape's erosion filter over a row of columns, see
+/// generator/landscape/erosion.h.
+struct ErosionRow {
+    float* slope_x = nullptr;  ///< voxels a column; all of these have `count` values
+    float* slope_z = nullptr;
+    float* mask = nullptr;
+    float* fade = nullptr;
+    float* sum = nullptr;
+    const float* fraction_x = nullptr;  ///< of the octave's cell, 0..1
+    /// The random points of the 3 x 3 cells around each column's, from its own cell's corner:
+    /// kErosionPoints planes of x, then of z, `plane` values each.
+    const float* points = nullptr;
+    std::int64_t plane = 0;
+    float fraction_z = 0;
+    float amplitude = 0;     ///< voxels
+    float steepening = 0;    ///< what a stripe adds to the slope
+    std::int32_t count = 0;  ///< a multiple of kVectorPad
+};
+
+inline constexpr std::int32_t kErosionPoints = 9;
+
 struct RowKernels {
     /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
     /// the top four bits of mix(hash ^ row_value) number the sixteen unit vectors. Whole blocks.
@@ -105,6 +126,8 @@ struct RowKernels {
     /// `step` voxels apart. As if the whole plane were inside the outline.
     void (*element_tile)(float* thickness, float x, float z, float step,
                          const SegmentTable& segments, float inverse_half_side, float thick);
+    /// Stripes down the slopes of a row, and what they make of its slopes.
+    void (*erode)(const ErosionRow& row);
 };
 
 namespace kernels_scalar {
