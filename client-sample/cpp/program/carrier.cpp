@@ -10,7 +10,10 @@ namespace terrane {
 namespace {
 
 Result<std::optional<CarriedMessage>> next_message(FrameReader& reader) {
-    const auto frame = reader.next();
+    auto frame = reader.next();
+    while (frame && *frame && !is_known(**frame)) {  // a newer server's: passed over
+        frame = reader.next();
+    }
     if (!frame) {
         return tl::unexpected(frame.error());
     }
