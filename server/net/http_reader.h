@@ -3,9 +3,8 @@
 #pragma once
 
 #include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "server/http/http_message.h"
-
-#include <tl/expected.hpp>
 
 #include <cstddef>
 #include <memory>

@@ -272,24 +272,22 @@ class WebSocketProtocol final : public ByteProtocol {
                                     reason));
         }
     }
-}
 
-std::shared_ptr<Session>
-    session_;
+    std::shared_ptr<Session> session_;
 
-WebSocketReader reader_;
-std::deque<Bytes> control_;        ///< frames of our own: the handshake's answer, pongs, a close
-std::size_t control_written_ = 0;  ///< of the first
-Head head_;                        ///< of the message under way
-std::size_t head_written_ = 0;
-std::uint64_t message_left_ = 0;  ///< of the message under way
-std::vector<Planned> plan_;       ///< what the last `gather` gave out
-std::deque<Head> new_heads_;      ///< of the messages that it begins
-bool closing_ = false;            ///< nothing more is taken from the client
-bool close_queued_ = false;       ///< nothing follows `control_`
-bool draining_ = false;
-bool dead_ = false;
-std::string close_reason_;
+    WebSocketReader reader_;
+    std::deque<Bytes> control_;  ///< frames of our own: the handshake's answer, pongs, a close
+    std::size_t control_written_ = 0;  ///< of the first
+    Head head_;                        ///< of the message under way
+    std::size_t head_written_ = 0;
+    std::uint64_t message_left_ = 0;  ///< of the message under way
+    std::vector<Planned> plan_;       ///< what the last `gather` gave out
+    std::deque<Head> new_heads_;      ///< of the messages that it begins
+    bool closing_ = false;            ///< nothing more is taken from the client
+    bool close_queued_ = false;       ///< nothing follows `control_`
+    bool draining_ = false;
+    bool dead_ = false;
+    std::string close_reason_;
 };
 
 }  // namespace
