@@ -170,7 +170,7 @@ class SectionPainter {
     std::int32_t left_ = -1;
     std::int32_t right_ = -1;
     std::vector<PairedLimit> paired_;
-    std::vector<std::uint16_t> scratch_;
+    std::vector<float> scratch_;
     std::vector<CutLimit> limits_;
 };
 

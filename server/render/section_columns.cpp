@@ -4,6 +4,7 @@
 #include "generator/volume/water.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 namespace terrane {
@@ -80,31 +81,39 @@ struct Match {
     std::size_t right = 0;
 };
 
-/// The longest common subsequence.
+/// What it is worth to pair two limits: nothing if they don't show the same, else more the nearer
+/// they are, but always more than to leave them unpaired.
+float worth_of(const SeenLimit& left, const SeenLimit& right) {
+    constexpr float kPair = 4096;  // voxels
+    return left.sort == right.sort ? kPair - std::min(std::abs(left.y - right.y), kPair - 1) : 0.0F;
+}
+
+/// The common subsequence that is worth most.
 std::vector<Match> matches_of(const SeenColumn& left, const SeenColumn& right,
-                              std::vector<std::uint16_t>& scratch) {
+                              std::vector<float>& scratch) {
     std::vector<Match> matches;
     const std::size_t row = right.size() + 1;
     if (left.size() * right.size() > kComparisonsMax) {
         return matches;
     }
-    // scratch[i * row + j]: the most pairs that left from i on and right from j on can have.
+    // scratch[i * row + j]: the most that left from i on and right from j on are worth.
     scratch.assign((left.size() + 1) * row, 0);
     for (std::size_t i = left.size(); i-- > 0;) {
         for (std::size_t j = right.size(); j-- > 0;) {
+            const float worth = worth_of(left[i], right[j]);
+            const float paired = worth > 0 ? worth + scratch[(i + 1) * row + j + 1] : 0.0F;
             scratch[i * row + j] =
-                left[i].sort == right[j].sort
-                    ? static_cast<std::uint16_t>(scratch[(i + 1) * row + j + 1] + 1)
-                    : std::max(scratch[(i + 1) * row + j], scratch[i * row + j + 1]);
+                std::max({paired, scratch[(i + 1) * row + j], scratch[i * row + j + 1]});
         }
     }
     for (std::size_t i = 0, j = 0; i < left.size() && j < right.size();) {
-        if (left[i].sort == right[j].sort) {
-            matches.push_back({.left = i++, .right = j++});
-        } else if (scratch[(i + 1) * row + j] >= scratch[i * row + j + 1]) {
+        const float most = scratch[i * row + j];
+        if (most == scratch[(i + 1) * row + j]) {
             ++i;
-        } else {
+        } else if (most == scratch[i * row + j + 1]) {
             ++j;
+        } else {
+            matches.push_back({.left = i++, .right = j++});
         }
     }
     return matches;
@@ -114,14 +123,24 @@ float height_at(const SeenColumn& column, std::size_t i) {
     return column[std::min(i, column.size() - 1)].y;
 }
 
-/// Limits between two matches: those of the left column first, then those of the right. What closes
-/// does so where the next limit is, or, where both columns have some, at the end that keeps heights
-/// ascending.
+/// Where limits `first` to `end` of one column close in the other: at the height of their middle as
+/// far as there is room between `lowest` and `highest`.
+float closing_height(const SeenColumn& column, std::size_t first, std::size_t end, float lowest,
+                     float highest) {
+    const float middle = first < end ? (column[first].y + column[end - 1].y) / 2 : lowest;
+    return std::clamp(middle, lowest, std::max(lowest, highest));
+}
+
+/// Limits between two matches: those of the left column first, then those of the right, so that
+/// heights ascend in both.
 void add_unmatched(std::vector<PairedLimit>& out, const SeenColumn& left, Match first, Match end,
                    const SeenColumn& right) {
-    const bool both = first.left < end.left && first.right < end.right;
-    const float right_y =
-        both ? (first.right > 0 ? right[first.right - 1].y : 0.0F) : height_at(right, end.right);
+    const float right_y = closing_height(left, first.left, end.left,
+                                         first.right > 0 ? right[first.right - 1].y : 0.0F,
+                                         height_at(right, first.right));
+    const float left_y =
+        closing_height(right, first.right, end.right, end.left > 0 ? left[end.left - 1].y : 0.0F,
+                       height_at(left, end.left));
     for (std::size_t i = first.left; i < end.left; ++i) {
         out.push_back({.y_left = left[i].y,
                        .y_right = right_y,
@@ -132,7 +151,7 @@ void add_unmatched(std::vector<PairedLimit>& out, const SeenColumn& left, Match 
                        .color_right = left[i].color});
     }
     for (std::size_t j = first.right; j < end.right; ++j) {
-        out.push_back({.y_left = height_at(left, end.left),
+        out.push_back({.y_left = left_y,
                        .y_right = right[j].y,
                        .in_left = false,
                        .in_right = true,
@@ -184,7 +203,7 @@ Result<std::vector<SeenColumn>> see_columns(const Drawing& drawing,
 }
 
 void pair_limits(std::vector<PairedLimit>& out, const SeenColumn& left, const SeenColumn& right,
-                 std::vector<std::uint16_t>& scratch) {
+                 std::vector<float>& scratch) {
     out.clear();
     Match next;
     for (const Match& match : matches_of(left, right, scratch)) {

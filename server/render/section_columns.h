@@ -49,6 +49,6 @@ struct PairedLimit {
 /// Pairs the limits of neighbours, bottom first; heights ascend on both sides. Overwrites `out`;
 /// `scratch` is a buffer.
 void pair_limits(std::vector<PairedLimit>& out, const SeenColumn& left, const SeenColumn& right,
-                 std::vector<std::uint16_t>& scratch);
+                 std::vector<float>& scratch);
 
 }  // namespace terrane

@@ -143,7 +143,7 @@ const pages = await startPages({
 });
 const browser = await openBrowser();
 try {
-    const names = all ? ['basin', 'ore-mountain', 'paper-B3'] : ['basin'];
+    const names = all ? ['basin', 'alpine', 'paper-B3'] : ['basin'];
     for (const name of named.length > 0 ? named : names) {
         await checkWorld(name, browser, pages.origin);
     }

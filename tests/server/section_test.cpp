@@ -112,7 +112,7 @@ TEST(Section, FrontiersRunSmoothlyFromColumnToColumn) {
                               limit(14, PaletteKind::layer, 0, low),
                               limit(14, PaletteKind::void_, 2, {})};
     std::vector<PairedLimit> paired;
-    std::vector<std::uint16_t> scratch;
+    std::vector<float> scratch;
     pair_limits(paired, left, right, scratch);
     ASSERT_EQ(paired.size(), 5U);
     EXPECT_EQ(paired[1].y_right, 14);
@@ -124,6 +124,25 @@ TEST(Section, FrontiersRunSmoothlyFromColumnToColumn) {
     for (std::size_t i = 1; i < paired.size(); ++i) {
         EXPECT_GE(paired[i].y_left, paired[i - 1].y_left);
         EXPECT_GE(paired[i].y_right, paired[i - 1].y_right);
+    }
+}
+
+TEST(Section, AHollowWithinALayerClosesBesideItself) {
+    const auto limit = [](float y, PaletteKind kind, std::size_t sort) {
+        return SeenLimit{.y = y, .kind = kind, .sort = sort, .color = {}};
+    };
+    const SeenColumn whole = {limit(0, PaletteKind::layer, 0), limit(10, PaletteKind::layer, 1),
+                              limit(70, PaletteKind::layer, 1), limit(70, PaletteKind::void_, 2)};
+    const SeenColumn hollow = {limit(0, PaletteKind::layer, 0),   limit(10, PaletteKind::layer, 1),
+                               limit(40, PaletteKind::layer, 1),  limit(40, PaletteKind::cave, 900),
+                               limit(50, PaletteKind::cave, 900), limit(50, PaletteKind::layer, 1),
+                               limit(70, PaletteKind::layer, 1),  limit(70, PaletteKind::void_, 2)};
+    std::vector<PairedLimit> paired;
+    std::vector<float> scratch;
+    pair_limits(paired, whole, hollow, scratch);
+    ASSERT_EQ(paired.size(), hollow.size());
+    for (const PairedLimit& one : paired) {
+        EXPECT_EQ(one.y_left, one.in_left ? one.y_right : 45);
     }
 }
 
