@@ -74,6 +74,58 @@ void CaveField::add(std::size_t i, CaveGap gap) {
     pool_[places_[i] * kCavesPerColumnMax + counts_[i]++] = gap;
 }
 
+void CaveField::add_tube(const Tube& tube, const RectangleShape& shape) {
+    const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
+    const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
+    if (columns.first >= columns.end || rows.first >= rows.end) {
+        return;
+    }
+    for (const Piece& piece : pieces_of(tube)) {
+        const float most = 1.45F * std::max(piece.from.radius, piece.from.radius + piece.dr) + 1.0F;
+        const float x_end = piece.from.x + piece.ex;
+        const float z_end = piece.from.z + piece.ez;
+        const Touched own_columns =
+            touched(tube.x, std::min(piece.from.x, x_end) - most,
+                    std::max(piece.from.x, x_end) + most, shape.x0, shape.width);
+        const Touched own_rows =
+            touched(tube.z, std::min(piece.from.z, z_end) - most,
+                    std::max(piece.from.z, z_end) + most, shape.z0, shape.length);
+        for (std::int32_t row = own_rows.first; row < own_rows.end; ++row) {
+            const float az = static_cast<float>(shape.z0 + row - tube.z) - piece.from.z;
+            for (std::int32_t column = own_columns.first; column < own_columns.end; ++column) {
+                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+                const float ax = static_cast<float>(shape.x0 + column - tube.x) - piece.from.x;
+                const float t = clamp01((ax * piece.ex + az * piece.ez) * piece.inverse_square);
+                const float qx = ax - t * piece.ex;
+                const float qz = az - t * piece.ez;
+                const float r = (piece.from.radius + t * piece.dr) *
+                                (1.0F + 0.25F * rough_[i] + 0.15F * ragged_[i]);
+                const float rest = r * r - (qx * qx + qz * qz);
+                if (rest <= 0) {
+                    continue;
+                }
+                const float hh = std::sqrt(rest);
+                const float up = kCeiling * (1.0F + 0.5F * ragged_[i]);
+                const float y = piece.from.y + t * piece.dy;
+                const float reach = hh * piece.steep;
+                CaveGap& gap = tube_[i];
+                gap.lid = std::max(gap.lid, std::min(y + up * reach, piece.y_max + up * hh));
+                gap.floor = std::min(
+                    gap.floor, std::max(y - kFlatFloor * reach, piece.y_min - kFlatFloor * hh));
+            }
+        }
+    }
+    for (std::int32_t row = rows.first; row < rows.end; ++row) {
+        for (std::int32_t column = columns.first; column < columns.end; ++column) {
+            const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+            if (tube_[i].lid > tube_[i].floor) {
+                add(i, tube_[i]);
+            }
+            tube_[i] = {.floor = kSky, .lid = -kSky};
+        }
+    }
+}
+
 void CaveField::build(const CaveConstants& constants, const CaveGraph& graph,
                       const RectangleShape& shape, const RowKernels& kernels,
                       NoiseBuffers& buffers) {
@@ -89,44 +141,9 @@ void CaveField::build(const CaveConstants& constants, const CaveGraph& graph,
     ragged_.resize(size);
     noise_rectangle(rough_.data(), constants.rough, shape, kernels, buffers);
     noise_rectangle(ragged_.data(), constants.ragged, shape, kernels, buffers);
+    tube_.assign(size, {.floor = kSky, .lid = -kSky});
     for (const Tube& tube : graph.tubes()) {
-        const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
-        const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
-        if (columns.first >= columns.end || rows.first >= rows.end) {
-            continue;
-        }
-        const auto pieces = pieces_of(tube);
-        for (std::int32_t row = rows.first; row < rows.end; ++row) {
-            const auto z = static_cast<float>(shape.z0 + row - tube.z);
-            for (std::int32_t column = columns.first; column < columns.end; ++column) {
-                const auto x = static_cast<float>(shape.x0 + column - tube.x);
-                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-                CaveGap gap{.floor = kSky, .lid = -kSky};
-                const float uneven = 1.0F + 0.25F * rough_[i] + 0.15F * ragged_[i];
-                const float up = kCeiling * (1.0F + 0.5F * ragged_[i]);
-                for (const Piece& piece : pieces) {
-                    const float ax = x - piece.from.x;
-                    const float az = z - piece.from.z;
-                    const float t = clamp01((ax * piece.ex + az * piece.ez) * piece.inverse_square);
-                    const float qx = ax - t * piece.ex;
-                    const float qz = az - t * piece.ez;
-                    const float r = (piece.from.radius + t * piece.dr) * uneven;
-                    const float rest = r * r - (qx * qx + qz * qz);
-                    if (rest <= 0) {
-                        continue;
-                    }
-                    const float hh = std::sqrt(rest);
-                    const float y = piece.from.y + t * piece.dy;
-                    const float reach = hh * piece.steep;
-                    gap.lid = std::max(gap.lid, std::min(y + up * reach, piece.y_max + up * hh));
-                    gap.floor = std::min(
-                        gap.floor, std::max(y - kFlatFloor * reach, piece.y_min - kFlatFloor * hh));
-                }
-                if (gap.lid > gap.floor) {
-                    add(i, gap);
-                }
-            }
-        }
+        add_tube(tube, shape);
     }
     for (const Doline& doline : graph.dolines()) {
         const float most = 1.45F * doline.radius + 1.0F;

@@ -102,8 +102,7 @@ struct CaveGap {
 /// The gaps of a rectangle's columns.
 class CaveField {
   public:
-    /// `ground` has the height of the ground for each column: funnels are cut there, by
-    /// `cut_funnels`, before.
+    /// Overwrites the field; empty above level 0.
     void build(const CaveConstants& constants, const CaveGraph& graph, const RectangleShape& shape,
                const RowKernels& kernels, NoiseBuffers& buffers);
 
@@ -116,6 +115,7 @@ class CaveField {
 
   private:
     void add(std::size_t i, CaveGap gap);
+    void add_tube(const Tube& tube, const RectangleShape& shape);
 
     std::vector<std::uint8_t> counts_;
     std::vector<std::uint32_t> places_;
@@ -123,6 +123,7 @@ class CaveField {
     std::uint32_t pool_used_ = 0;
     std::vector<float> rough_;
     std::vector<float> ragged_;
+    std::vector<CaveGap> tube_;  ///< of one tube, while it is being added
 };
 
 /// Lowers the ground around the mouths of dolines; `allowed` is 0 where water would run in and 1

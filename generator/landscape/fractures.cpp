@@ -57,6 +57,32 @@ Fracture draw_fracture(RandomStream& random, const FractureConstants& constants,
     return fracture;
 }
 
+/// Whether a fracture's ellipse can meet the shape: its l and a are linear but for the warp, so
+/// their extremes are at the corners.
+bool can_meet(const Fracture& fracture, const RectangleShape& shape) {
+    constexpr float kSlack = kWarp + 1;
+    const auto x0 = static_cast<float>(shape.x0 - fracture.x);
+    const auto z0 = static_cast<float>(shape.z0 - fracture.z);
+    const auto x1 = x0 + static_cast<float>((shape.width - 1) * shape.step);
+    const auto z1 = z0 + static_cast<float>((shape.length - 1) * shape.step);
+    float l_min = 1e9F;
+    float l_max = -1e9F;
+    float a_min = 1e9F;
+    float a_max = -1e9F;
+    for (const float x : {x0, x1}) {
+        for (const float z : {z0, z1}) {
+            const float l = x * fracture.along_x + z * fracture.along_z;
+            const float a = z * fracture.along_x - x * fracture.along_z;
+            l_min = std::min(l_min, l);
+            l_max = std::max(l_max, l);
+            a_min = std::min(a_min, a);
+            a_max = std::max(a_max, a);
+        }
+    }
+    return l_min < fracture.length + kSlack && l_max > -fracture.length - kSlack &&
+           a_min < fracture.reach + kSlack && a_max > -fracture.reach - kSlack;
+}
+
 std::vector<Fracture> find_fractures(const FractureConstants& constants,
                                      const RectangleShape& shape) {
     std::vector<Fracture> found;
@@ -71,7 +97,8 @@ std::vector<Fracture> find_fractures(const FractureConstants& constants,
             const auto count = static_cast<std::int32_t>(constants.density + random.unit());
             for (std::int32_t n = 0; n < count; ++n) {
                 const Fracture fracture = draw_fracture(random, constants, i, j);
-                if (fracture.half_throw > 0 || fracture.half_sheet > 0) {
+                if ((fracture.half_throw > 0 || fracture.half_sheet > 0) &&
+                    can_meet(fracture, shape)) {
                     found.push_back(fracture);
                 }
             }

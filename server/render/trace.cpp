@@ -161,8 +161,10 @@ Found advance(SceneReader& reader, const Ray& ray, double& t, double end, Sight 
                                       covers[SceneTile::index_of(cell_u, cell_v + 1)],
                                       covers[SceneTile::index_of(cell_u + 1, cell_v + 1)]}));
     double begin = t;
-    if (ray.direction.y < 0) {  // nothing to look at above the cell's highest corner
-        begin = std::max(begin, (highest - ray.origin.y) / ray.direction.y);
+    if (ray.direction.y < 0) {
+        // Nothing to look at above the cell's highest corner; level water is crossed from above it.
+        constexpr double kAbove = 0.01;
+        begin = std::max(begin, (highest + kAbove - ray.origin.y) / ray.direction.y);
     }
     t = std::max(exit, t) + kNudge;
     if (begin > exit || lowest(ray, begin, exit) > highest) {
