@@ -213,7 +213,7 @@ void heat(const ViewServer& server, const ViewWorld& world, double seconds) {
 
 struct Crowd {
     std::vector<FlightFigures> figures;
-    std::vector<double> share_bytes;  ///< of each, when the first had all of its view
+    std::vector<double> share_bytes;  ///< of each, while all still wanted more
 };
 
 /// Everybody at once; with `slow_name`, the first reads at 64 kbit/s only.
@@ -243,8 +243,8 @@ Crowd fly_together(const Options& options, const ViewServer& server, const ViewW
                 crowd.figures[i] = fly(plan);
             });
         }
-        // Shares are looked at while everybody still wants more: a fifth of a view on average.
-        constexpr std::uint64_t kLookAt = std::uint64_t{4} << 20U;
+        // Shares are looked at while everybody still wants more: half a view on average.
+        constexpr std::uint64_t kLookAt = std::uint64_t{10} << 20U;
         const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
         while (Clock::now() < deadline && crowd.share_bytes.empty()) {
             std::vector<double> shares;
@@ -284,7 +284,7 @@ void measure_crowd(const Options& options, Report& report,
                   static_cast<double>(count_of(server.counters().generations) - before), "");
     report.figure("crowd: wanted to there, p99", percentile(wanted_ms, 0.99), "ms");
     if (shares.empty()) {
-        std::fprintf(stderr, "crowd: nobody got 4 MB in time; the machine is too busy\n");
+        std::fprintf(stderr, "crowd: not 10 MB each in time; the machine is too busy\n");
         std::exit(1);
     }
     double mean = 0;
