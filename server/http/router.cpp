@@ -118,6 +118,9 @@ void RouteParams::add(std::string_view name, std::string_view value) {
 }
 
 std::optional<std::string> percent_decoded(std::string_view text) {
+    if (text.find('%') == std::string_view::npos && text.find('\0') == std::string_view::npos) {
+        return std::string(text);  // nearly always
+    }
     std::string out;
     out.reserve(text.size());
     for (std::size_t i = 0; i < text.size(); ++i) {
@@ -212,19 +215,31 @@ Router::Entry Router::entry_of(Route route, bool versioned) {
     return entry;
 }
 
-bool Router::matches(const Entry& entry, std::string_view path, RouteParams& params) {
-    params.clear();
-    for (std::size_t i = 0; i < entry.segments.size(); ++i) {
-        const Segment& segment = entry.segments[i];
-        if (path.empty()) {
-            return false;
-        }
-        if (entry.takes_rest && i + 1 == entry.segments.size()) {
-            params.add(segment.front().text, path.substr(1));
-            return path.size() > 1;
-        }
-        auto [text, behind] = split_segment(path);
+Router::CutPath Router::cut(std::string_view path) {
+    CutPath out{.segments = {}, .count = 0, .goes_on = false, .whole = path};
+    while (!path.empty() && out.count < out.segments.size()) {
+        const auto [segment, behind] = split_segment(path);
+        out.segments[out.count++] = segment;
         path = behind;
+    }
+    out.goes_on = !path.empty();
+    return out;
+}
+
+bool Router::matches(const Entry& entry, const CutPath& path, RouteParams& params) {
+    const std::size_t count = entry.segments.size();
+    if (entry.takes_rest ? count > path.count : count != path.count || path.goes_on) {
+        return false;
+    }
+    params.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+        const Segment& segment = entry.segments[i];
+        std::string_view text = path.segments[i];
+        if (entry.takes_rest && i + 1 == count) {
+            const auto before = static_cast<std::size_t>(text.data() - path.whole.data());
+            params.add(segment.front().text, path.whole.substr(before));
+            return before < path.whole.size();
+        }
         for (std::size_t piece = 0; piece < segment.size(); ++piece) {
             if (!segment[piece].is_name) {
                 if (!text.starts_with(segment[piece].text)) {
@@ -254,13 +269,14 @@ bool Router::matches(const Entry& entry, std::string_view path, RouteParams& par
             return false;
         }
     }
-    return path.empty();
+    return true;
 }
 
 const Router::Entry* Router::find(std::string_view path, bool versioned,
                                   RouteParams& params) const {
+    const CutPath cut_path = cut(path);
     for (const Entry& entry : entries_) {
-        if (entry.versioned == versioned && matches(entry, path, params)) {
+        if (entry.versioned == versioned && matches(entry, cut_path, params)) {
             return &entry;
         }
     }

@@ -27,6 +27,7 @@ namespace terrane {
 
 /// Of one pattern.
 inline constexpr std::size_t kRouteParamsMax = 8;
+inline constexpr std::size_t kPathSegmentsMax = 16;
 
 /// The values of a pattern's names. Views into the request's path.
 class RouteParams {
@@ -115,8 +116,17 @@ class Router {
         std::vector<Segment> segments;
     };
 
+    /// A path cut at its slashes, once for all the patterns that it is held against.
+    struct CutPath {
+        std::array<std::string_view, kPathSegmentsMax> segments;
+        std::size_t count = 0;  ///< of the segments that are cut
+        bool goes_on = false;   ///< there are more
+        std::string_view whole;
+    };
+
     static Entry entry_of(Route route, bool versioned);
-    static bool matches(const Entry& entry, std::string_view path, RouteParams& params);
+    static CutPath cut(std::string_view path);
+    static bool matches(const Entry& entry, const CutPath& path, RouteParams& params);
     const Entry* find(std::string_view path, bool versioned, RouteParams& params) const;
     void handle_path(const HttpRequest& request, HttpRespond respond) const;
 

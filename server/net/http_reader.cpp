@@ -60,7 +60,7 @@ class RequestParser final : public http::basic_parser<true> {
         received.is_http_1_0 = version == 10;
         received.request.method.assign(method.data(), method.size());
         const std::string_view whole = without_origin(view_of(target));
-        const std::size_t end = std::min(whole.find_first_of("?#"), whole.size());
+        const std::size_t end = std::min({whole.find('?'), whole.find('#'), whole.size()});
         received.request.target_path = whole.substr(0, end);
         if (end < whole.size() && whole[end] == '?') {
             const std::string_view query = whole.substr(end + 1);
