@@ -139,6 +139,28 @@ TEST(HttpServer, DescribesItsWorld) {
     EXPECT_EQ(page->header("content-type"), "text/html; charset=utf-8");
 }
 
+TEST(HttpServer, CountsWhatItDoes) {
+    const Running r;
+    HttpClient client(r.port());
+    const std::string chunk = r.prefix + "/chunks/0/4/0/4.columns";
+    ASSERT_TRUE(client.get(chunk));
+    ASSERT_TRUE(client.get(chunk));
+    ASSERT_TRUE(client.get("/nothing"));
+    const auto reply = client.get("/metrics");
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->header("content-type"), "text/plain; version=0.0.4; charset=utf-8");
+    for (const char* line :
+         {"terrane_requests_total{outcome=\"cache\"} 1\n",
+          "terrane_requests_total{outcome=\"generated\"} 1\n", "terrane_generations_total 1\n",
+          "terrane_stage_seconds_count{stage=\"queue\"} 1\n",
+          "terrane_stage_seconds_count{stage=\"generate\"} 1\n", "terrane_sessions 1\n",
+          "terrane_http_answers_total{status=\"2xx\"} 2\n",
+          "terrane_http_answers_total{status=\"4xx\"} 1\n", "terrane_queue_jobs 0\n",
+          "# TYPE terrane_sent_bytes_total counter\n"}) {
+        EXPECT_THAT(reply->body, HasSubstr(line));
+    }
+}
+
 TEST(HttpServer, HeadIsGetWithoutABody) {
     const Running r;
     HttpClient client(r.port());
