@@ -1,5 +1,6 @@
 // Landscapes go through all that stacks go through: codec and mesh.
 #include "generator/mesh/surface_nets.h"
+#include "generator/terrain/generate_stack.h"
 #include "generator/volume/chunk_codec.h"
 #include "generator/volume/water.h"
 #include "tests/support/mesh_audit.h"
