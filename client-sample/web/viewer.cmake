@@ -1,5 +1,5 @@
-# The viewer: built by npm into build/viewer, which all presets share and where `terrane serve` of a
-# build tree looks for it; installed into share/terrane/viewer.
+# The viewer: built by npm into client-sample/web/dist, which all presets share and where `terrane serve`
+# of a build tree looks for it; installed into share/terrane/viewer.
 option(TERRANE_VIEWER "Build the web viewer (node, npm, clang 19 for wasm32-wasi)" ON)
 find_program(NPM npm)
 find_program(CLANGXX_WASM clang++-19)
@@ -7,7 +7,7 @@ if(NOT TERRANE_VIEWER OR NOT NPM OR NOT CLANGXX_WASM OR NOT EXISTS /usr/lib/wasm
     message(STATUS "The viewer is not built: TERRANE_VIEWER, npm or clang 19 for wasm32-wasi is missing")
     return()
 endif()
-set(viewer ${CMAKE_SOURCE_DIR}/build/viewer)
+set(viewer ${CMAKE_SOURCE_DIR}/client-sample/web/dist)
 file(GLOB_RECURSE viewer_sources CONFIGURE_DEPENDS
     client-sample/web/src/*.ts client-sample/web/src/*.css client-sample/typescript/src/*.ts
     client-sample/typescript/wasm/*.h client-sample/typescript/wasm/*.cpp

@@ -121,20 +121,6 @@ Result<std::vector<ViewerFile>> read_viewer_files(const fs::path& folder) {
     return files;
 }
 
-std::filesystem::path built_viewer_folder() {
-    std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error);
-    const fs::path folder = program.parent_path().parent_path();
-    for (const fs::path& viewer :
-         {folder / "share" / "terrane" / "viewer", folder.parent_path() / "viewer"}) {
-        if (!error && fs::is_regular_file(viewer / kIndexName, error)) {
-            return viewer;
-        }
-        error.clear();
-    }
-    return {};
-}
-
 void add_viewer_routes(Router& router, std::vector<ViewerFile> files) {
     if (files.empty()) {
         files.push_back({.path = "/" + std::string(kIndexName),

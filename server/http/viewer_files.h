@@ -28,10 +28,6 @@ std::string_view content_type_of(std::string_view path);
 /// `io_error`, or `too_large` beyond the two limits.
 Result<std::vector<ViewerFile>> read_viewer_files(const std::filesystem::path& folder);
 
-/// Where the viewer lies that was built or installed with this program: ../share/terrane/viewer or,
-/// in a build tree, build/viewer. Empty if there is none.
-std::filesystem::path built_viewer_folder();
-
 /// Each under its path, and "index.html" as its folder too. Without files "/" gets a small page
 /// that links to the API. Nobody needs a token for them: the viewer is where one is typed in.
 void add_viewer_routes(Router& router, std::vector<ViewerFile> files);

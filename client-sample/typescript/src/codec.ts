@@ -161,27 +161,24 @@ export function goodbye(): Uint8Array {
     );
 }
 
-function addVector(builder: Builder, vector: Vector | undefined): number {
-    return vector === undefined
-        ? 0
-        : WireVector.createVector(builder, vector.x, vector.y, vector.z);
+function vectorOf(builder: Builder, { x, y, z }: Vector): number {
+    return WireVector.createVector(builder, x, y, z);
 }
 
 export function viewUpdate(view: View): Uint8Array {
     return frameOf(Body.ViewUpdate, (builder) => {
-        const direction = addVector(builder, view.direction);
-        const velocity = addVector(builder, view.velocity);
         const radius = ViewUpdate.createRadiusChunksVector(builder, view.radiusChunks);
         ViewUpdate.startViewUpdate(builder);
         ViewUpdate.addX(builder, view.position.x);
         ViewUpdate.addY(builder, view.position.y);
         ViewUpdate.addZ(builder, view.position.z);
-        if (direction !== 0) {
-            ViewUpdate.addDirection(builder, direction);
+        // A struct lies in its table: it is made right where it is added.
+        if (view.direction !== undefined) {
+            ViewUpdate.addDirection(builder, vectorOf(builder, view.direction));
         }
         ViewUpdate.addFieldOfView(builder, view.fieldOfView ?? 0);
-        if (velocity !== 0) {
-            ViewUpdate.addVelocity(builder, velocity);
+        if (view.velocity !== undefined) {
+            ViewUpdate.addVelocity(builder, vectorOf(builder, view.velocity));
         }
         ViewUpdate.addRadiusChunks(builder, radius);
         ViewUpdate.addFormat(builder, view.format);

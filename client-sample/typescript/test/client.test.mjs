@@ -20,6 +20,7 @@ import {
     compileColumns,
     keyName,
     mixAt,
+    wantSet,
 } from '../dist/index.js';
 import { connectTcp } from '../dist/tcp.js';
 import { basin, startServer, terrane, terraneClient } from './server.mjs';
@@ -235,6 +236,45 @@ test('a cut shows the materials of its columns', async () => {
             assert.equal(pixels.colors[at + 3], isHollow || pixels.contents[at + 1] === PaletteKind.Cave + 1 ? 0 : 255);
         }
     }
+});
+
+test('a view sends its whole want-set, credited as it is consumed, and forgets what it leaves', async () => {
+    const own = await TerraneClient.connect(await connectTcp({ port: server.port }), { name: 'view test' });
+    assert.equal(own.hasViews, true);
+    const came = new Set();
+    const forgotten = new Set();
+    let bytes = 0;
+    let full;
+    own.onViewChunk = async (chunk) => {
+        await new Promise((resolve) => setTimeout(resolve, 1));
+        came.add(keyName(chunk.key));
+        bytes += chunk.payload.byteLength;
+        full?.();
+    };
+    own.onForget = (keys) => keys.forEach((key) => forgotten.add(keyName(key)));
+    const radiusChunks = [3, 2, 2];
+    const look = async (position) => {
+        const wanted = wantSet(position, radiusChunks, own.hello.chunkSide)
+            .flatMap((square) => chunksOf(square, own.hello))
+            .map(keyName);
+        own.updateView({
+            position,
+            direction: { x: 1, y: 0, z: 0 },
+            velocity: { x: 0, y: 0, z: 0 },
+            radiusChunks,
+            format: Format.Draco,
+        });
+        while (!wanted.every((name) => came.has(name))) {
+            await new Promise((resolve) => (full = resolve));
+        }
+        return wanted;
+    };
+    const first = await look({ x: 100, y: 200, z: -300 });
+    assert.deepEqual([...came].sort(), first.sort());
+    assert.ok(bytes > own.hello.limits.creditWindowBytes, `${bytes} bytes are more than one window`);
+    await look({ x: 100_000, y: 200, z: -300 });
+    assert.ok(first.every((name) => forgotten.has(name)));
+    own.close();
 });
 
 test('broken columns are refused with a reason', async () => {

@@ -18,7 +18,7 @@ if (!existsSync(terrane)) {
 export function startServer(...options) {
     const server = spawn(
         terrane,
-        ['serve', '--world', basin, '--store', 'memory', '--tcp', '127.0.0.1:0', ...options],
+        ['serve', '--world', basin, '--store', 'memory', '--tcp', '127.0.0.1:0', '--http', 'none', ...options],
         { stdio: ['ignore', 'pipe', 'pipe'] },
     );
     return new Promise((resolve, reject) => {
