@@ -1,6 +1,5 @@
 // The columns that a client has received: voxels, whole columns, ground under a foot, and meshes
-// made here instead of on the server. No Draco is needed: a COLUMNS chunk has a third of the bytes
-// of its mesh.
+// made here instead of on the server. No Draco is needed.
 //
 // A chunk carries its own N x N columns from its floor to its ceiling. A mesh needs a little more:
 // one column on each side, since a surface's quads reach there, and five voxels below and above,

@@ -8,7 +8,8 @@
 //
 // The server sends what the view wants, most urgent first; this decodes it within the time that
 // `poll` is given. In the form `columns` it is sent no meshes: it makes them itself (column_map.h),
-// from a third of the bytes, and every voxel near the viewer can be asked for. A chunk is meshed
+// and every voxel near the viewer can be asked for. Columns come for the ground's inside too, where
+// no mesh is: in all they are more bytes than the meshes. A chunk is meshed
 // when its neighbours in the view have come. At the rim, where a neighbour is not in the view, the
 // mesh is made without; it comes again, exact, when the neighbour enters the view.
 #pragma once

@@ -150,6 +150,22 @@ TEST_F(LoadClientTest, GivesCreditForWhatItDecoded) {
     EXPECT_NE(client.counts().first_fault.find("undecodable"), std::string::npos);
 }
 
+TEST_F(LoadClientTest, DecodesEveryNthChunkOnlyIfAskedTo) {
+    auto seldom = options(true);
+    seldom.decode_every = 2;
+    LoadClient client = make(seldom);
+    ASSERT_TRUE(tell(client, hello_with_views()));
+    for (std::int32_t y = 0; y < 4; ++y) {
+        ChunkAnswer answer = empty_chunk(0, {.lod = 0, .x = 0, .y = y, .z = 0});
+        answer.status = ChunkStatus::full;
+        answer.payload_bytes = 40;
+        ASSERT_TRUE(tell(client, answer, Bytes(40, std::byte{0x55})));
+    }
+    EXPECT_EQ(client.counts().undecodable, 2U);
+    EXPECT_EQ(client.missing(), 0U);
+    EXPECT_EQ(decoded_, 0);
+}
+
 TEST_F(LoadClientTest, WithoutViewsItAsksByKeyAndAsksBusyOnesAgain) {
     LoadClient client = make(options(false));
     ASSERT_TRUE(tell(client, test_hello()));
@@ -194,6 +210,19 @@ TEST_F(LoadClientTest, SilenceWhileItWantsIsAHang) {
         ASSERT_TRUE(tell(client, empty_chunk(0, {.lod = 0, .x = 0, .y = y, .z = 0})));
     }
     EXPECT_FALSE(client.is_hung(now_ + 11s)) << "it wants nothing";
+}
+
+TEST_F(LoadClientTest, WhoWantedNothingForLongIsNotHungWhenItWantsAgain) {
+    LoadClient client = make(options(true));
+    ASSERT_TRUE(tell(client, hello_with_views()));
+    for (std::int32_t y = 0; y < 4; ++y) {
+        ASSERT_TRUE(tell(client, empty_chunk(0, {.lod = 0, .x = 0, .y = y, .z = 0})));
+    }
+    now_ += 11s;  // the path has led two stacks on
+    client.tick(now_);
+    EXPECT_EQ(client.missing(), 4U);
+    EXPECT_FALSE(client.is_hung(now_ + 9s));
+    EXPECT_TRUE(client.is_hung(now_ + 11s));
 }
 
 TEST_F(LoadClientTest, TheSessionEndsWithWhatTheServerSays) {

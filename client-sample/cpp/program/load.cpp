@@ -3,6 +3,8 @@
 #include "client-sample/cpp/program/local_check.h"
 #include "client-sample/cpp/program/stream_loop.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -21,6 +23,18 @@ constexpr std::chrono::milliseconds kProgress{1000};
 constexpr std::size_t kNotesMax = 8;
 /// HTTP says a uniform chunk's shares with six decimals.
 constexpr double kHttpShareTolerance = 1e-6;
+
+/// Of this process so far.
+double cpu_seconds() {
+    rusage usage{};
+    if (getrusage(RUSAGE_SELF, &usage) != 0) {
+        return 0;
+    }
+    const auto seconds = [](const timeval& time) {
+        return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) / 1e6;
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
 
 /// One run: all is on the calling thread but the checks.
 class LoadRun {
@@ -155,7 +169,8 @@ void LoadRun::tick_clients(Clock::time_point now) {
         if (viewer.is_open) {
             viewer.client->tick(now);
             flush(viewer);
-            viewer.is_hung = viewer.is_hung || viewer.client->is_hung(now);
+            viewer.is_hung = viewer.is_hung ||
+                             (viewer.client->is_hung(now) && !loop_->has_unread(viewer.stream));
         }
     }
 }
@@ -272,6 +287,7 @@ LoadResult LoadRun::finish() {
         loop_->close(viewer.stream);
     }
     result.seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+    result.cpu_seconds = cpu_seconds();
     if (check_) {
         check_->finish();
         const CheckCounts counts = check_->counts();

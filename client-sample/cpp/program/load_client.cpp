@@ -32,7 +32,7 @@ void LoadClient::send(const AnyMessage& message) {
 }
 
 void LoadClient::open(Clock::time_point now) {
-    opened_ = last_sign_ = last_account_ = now;
+    last_sign_ = wants_since_ = last_account_ = now;
     output_ = carrier_->opening();
     send(ClientHello{.protocol_version = kProtocolVersion,
                      .client_name = "terrane-client load",
@@ -51,7 +51,16 @@ void LoadClient::note_fault(std::string fault) {
 }
 
 bool LoadClient::is_hung(Clock::time_point now) const {
-    return (!hello_ || missing_ > 0) && now - last_sign_ > options_.patience;
+    return (!hello_ || missing_ > 0) &&
+           now - std::max(last_sign_, wants_since_) > options_.patience;
+}
+
+/// What wants nothing hears nothing, and has not been kept waiting.
+void LoadClient::miss(std::size_t count, Clock::time_point now) {
+    if (missing_ == 0) {
+        wants_since_ = now;
+    }
+    missing_ += count;
 }
 
 /// How long something was missing is summed up whenever that may change.
@@ -131,7 +140,7 @@ void LoadClient::change_wants(const ViewSet& next, Clock::time_point now) {
         const auto heights = static_cast<std::size_t>(heights_of(square.lod, *hello_));
         wants_.insert_or_assign(square,
                                 Want{.since = now, .has_come = std::vector<bool>(heights, false)});
-        missing_ += heights;
+        miss(heights, now);
     }
     if (options_.by_view) {
         return;
@@ -217,7 +226,7 @@ Result<void> LoadClient::take(CarriedMessage& carried, Clock::time_point now) {
         return take_failure(*failure, now);
     }
     if (const auto* forget = std::get_if<ChunkForget>(&message)) {
-        take_forget(*forget);
+        take_forget(*forget, now);
         return {};
     }
     if (const auto* ping = std::get_if<Ping>(&message)) {
@@ -290,14 +299,18 @@ void LoadClient::take_chunk(const ChunkAnswer& answer, std::span<const std::byte
     }
     ++counts_.chunks;
     counts_.bytes += payload.size();
-    const auto content = read_chunk(answer, payload, *hello_);
+    const bool is_decoded = counts_.chunks % options_.decode_every == 0;
+    const auto content =
+        is_decoded ? read_chunk(answer, payload, *hello_) : Result<ChunkContent>(ChunkContent{});
     const auto decoded = Clock::now();
     if (!content) {
         ++counts_.undecodable;
         note_fault("undecodable: " + content.error().message);
     } else {
         counts_.triangles += content->triangle_count();
-        handlers_.chunk(answer, payload);
+        if (is_decoded) {
+            handlers_.chunk(answer, payload);
+        }
     }
     const auto want = wants_.find(stack_of(answer.key));
     if (want == wants_.end()) {
@@ -310,12 +323,14 @@ void LoadClient::take_chunk(const ChunkAnswer& answer, std::span<const std::byte
     settle(answer.key);
     if (missing_ == 0 && !counts_.fill) {
         counts_.fill = us_between(begin_, decoded);
+        counts_.fill_chunks = counts_.chunks;
     }
 }
 
 /// What is forgotten and wanted again comes again: the server was told both, and says both in
 /// order.
-void LoadClient::take_forget(const ChunkForget& forget) {
+void LoadClient::take_forget(const ChunkForget& forget, Clock::time_point now) {
+    account_wanting(now);
     counts_.forgotten += forget.keys.size();
     for (const ChunkPos key : forget.keys) {
         const auto want = wants_.find(stack_of(key));
@@ -323,7 +338,7 @@ void LoadClient::take_forget(const ChunkForget& forget) {
         if (want != wants_.end() && key.y >= 0 && y < want->second.has_come.size() &&
             want->second.has_come[y]) {
             want->second.has_come[y] = false;
-            ++missing_;
+            miss(1, now);
         }
     }
 }

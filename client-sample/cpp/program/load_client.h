@@ -38,7 +38,8 @@ struct LoadClientOptions {
     ChunkFormat format = ChunkFormat::draco;
     std::vector<std::uint32_t> radius_chunks = {3, 3, 3, 3};
     bool by_view = true;
-    bool asks_world = false;  ///< for the world file, at the greeting
+    std::uint64_t decode_every = 1;  ///< chunks; the others count as soon as they have come
+    bool asks_world = false;         ///< for the world file, at the greeting
     std::string token;
     std::chrono::milliseconds patience{10'000};  ///< silent for so long while it wants: hung
 };
@@ -56,6 +57,7 @@ struct LoadCounts {
     std::uint64_t forgotten = 0;
     LatencyCounts latency;
     std::optional<std::chrono::microseconds> fill;  ///< first view asked for, to all of it there
+    std::uint64_t fill_chunks = 0;                  ///< of these, that came until then
     std::chrono::microseconds wanting{};            ///< how long something was missing
     std::string first_fault;
 };
@@ -127,7 +129,8 @@ class LoadClient {
     void take_chunk(const ChunkAnswer& answer, std::span<const std::byte> payload,
                     Clock::time_point now);
     Result<void> take_failure(const Failure& failure, Clock::time_point now);
-    void take_forget(const ChunkForget& forget);
+    void take_forget(const ChunkForget& forget, Clock::time_point now);
+    void miss(std::size_t count, Clock::time_point now);
     bool answered(std::uint32_t request_id, ChunkPos key);
     void note_fault(std::string fault);
 
@@ -138,9 +141,9 @@ class LoadClient {
     Bytes output_;
     std::optional<ServerHello> hello_;
     bool is_moving_ = true;
-    Clock::time_point begin_;  ///< of the movement: when it was greeted
-    Clock::time_point opened_;
-    Clock::time_point last_sign_;  ///< anything from the server
+    Clock::time_point begin_;        ///< of the movement: when it was greeted
+    Clock::time_point last_sign_;    ///< anything from the server
+    Clock::time_point wants_since_;  ///< when it last began to miss anything
     Clock::time_point last_account_;
     std::optional<Clock::time_point> view_due_;  ///< a view that was refused is told again then
     ViewerPlace place_;

@@ -203,6 +203,13 @@ void add_load_command(CLI::App& app, int& exit_code) {
                      "file; 0: none")
         ->type_name("N")
         ->capture_default_str();
+    load->add_option("--decode", flags->options.client.decode_every,
+                     "Decode every N-th chunk only, where decoding would take the processor that "
+                     "the server needs; the others count when they have come, and --check takes "
+                     "its N-th of those that are decoded")
+        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000}))
+        ->type_name("N")
+        ->capture_default_str();
     load->add_option("--patience", flags->patience_seconds,
                      "A client that wants chunks and hears nothing for so many seconds is hung")
         ->check(CLI::Range(0.1, 3600.0))
@@ -211,7 +218,7 @@ void add_load_command(CLI::App& app, int& exit_code) {
     load->footer(
         "Latency is from the moment a chunk is wanted to the moment it is decoded. Fairness is\n"
         "Jain's index, and the least over the most, of the chunks that each client got a second\n"
-        "while it wanted any. Wasted is what came after it had left the view.\n"
+        "until its first view was whole. Wasted is what came after it had left the view.\n"
         "Exit code: 0 all came and was right, 1 something was wrong, refused, hung or cut off,\n"
         "2 wrong use.\n"
         "Examples:\n"

@@ -59,6 +59,9 @@ double jain_index(std::span<const double> rates) {
 }
 
 double rate_of(const LoadCounts& counts) {
+    if (counts.fill) {
+        return per_second(counts.fill_chunks, std::chrono::duration<double>(*counts.fill).count());
+    }
     const double seconds = std::chrono::duration<double>(counts.wanting).count();
     return per_second(counts.chunks, seconds);
 }
@@ -91,6 +94,7 @@ std::string load_json(const LoadResult& r) {
                                          {"wasted_chunks", r.wasted_chunks},
                                          {"wasted_bytes", r.wasted_bytes},
                                          {"wasted_share", rounded(share(r.wasted_bytes, r.bytes))},
+                                         {"load_cpu_seconds", rounded(r.cpu_seconds)},
                                          {"notes", r.notes}};
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
@@ -114,6 +118,7 @@ std::string load_text(const LoadResult& r) {
         line("checked %llu, wrong %llu, refused %llu, hung %zu, disconnected %zu, unfilled %zu\n",
              static_cast<unsigned long long>(r.checked), static_cast<unsigned long long>(r.wrong),
              static_cast<unsigned long long>(r.refused), r.hung, r.disconnected, r.unfilled);
+    text += line("the load itself took %.1f s of processor time\n", r.cpu_seconds);
     for (const std::string& note : r.notes) {
         text += note + "\n";
     }

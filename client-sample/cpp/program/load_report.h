@@ -31,6 +31,7 @@ struct LoadResult {
     std::size_t unfilled = 0;        ///< still got chunks when the load ended
     LatencyCounts latency;           ///< wanted to decoded
     LatencyCounts fill;              ///< of clients whose view was filled
+    double cpu_seconds = 0;          ///< of the load itself: at one a second it measures itself
     double fairness = 1;             ///< Jain's index of the clients' rates
     double fairness_min_max = 1;     ///< the slowest client's rate over the fastest's
     std::vector<std::string> notes;  ///< what was wrong, first of each kind
@@ -44,7 +45,8 @@ void add(LoadResult& result, const LoadCounts& counts);
 /// Jain's index, (sum x)^2 / (n sum x^2): 1 when all are equal, 1/n when one has all. 1 for nobody.
 double jain_index(std::span<const double> rates);
 
-/// Chunks that a client got a second while it wanted any; what fairness is about.
+/// Chunks that a client got a second until its first view was whole, or while it wanted any if that
+/// never was: what fairness is about. Later a client wants little, and its rate says nothing.
 double rate_of(const LoadCounts& counts);
 
 std::string load_json(const LoadResult& result);

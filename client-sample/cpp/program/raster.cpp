@@ -16,9 +16,9 @@ namespace {
 constexpr std::int32_t kSamples = 2;  ///< along each side of a pixel
 constexpr float kNearVoxels = 0.25F;
 const glm::vec3 kToSun = glm::normalize(glm::vec3(0.55F, 0.62F, -0.45F));
-const glm::vec3 kSunLight(1.9F, 1.75F, 1.5F);
-const glm::vec3 kSkyLight(0.42F, 0.52F, 0.68F);
-const glm::vec3 kGroundLight(0.16F, 0.14F, 0.12F);
+const glm::vec3 kSunLight(1.35F, 1.24F, 1.06F);
+const glm::vec3 kSkyLight(0.26F, 0.33F, 0.44F);
+const glm::vec3 kGroundLight(0.10F, 0.09F, 0.08F);
 
 /// Highlights rolled off as film does.
 LinearColor developed(glm::vec3 light) {

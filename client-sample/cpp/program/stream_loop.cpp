@@ -19,7 +19,8 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr std::size_t kReceiveBytes = std::size_t{64} << 10U;
+/// Little, so that all connections are read in turn even when decoding is slower than the server.
+constexpr std::size_t kReceiveBytes = std::size_t{16} << 10U;
 
 /// A connection; kept alive by the operations that are under way.
 struct Stream {
@@ -182,6 +183,12 @@ void StreamLoop::send(StreamId id, Bytes bytes) {
     }
     stream.queue.push_back(std::move(bytes));
     state_->write(id);
+}
+
+bool StreamLoop::has_unread(StreamId id) const {
+    const Stream& stream = *state_->streams[id];
+    error_code error;
+    return stream.is_open && stream.socket.available(error) > 0 && !error;
 }
 
 void StreamLoop::close(StreamId id) {

@@ -45,6 +45,9 @@ class StreamLoop {
     /// Queues bytes. Nothing happens on a closed stream.
     void send(StreamId id, Bytes bytes);
 
+    /// The peer has sent bytes that have not been read yet: this side is the slow one.
+    bool has_unread(StreamId id) const;
+
     /// What is queued is still written, as far as the socket takes it at once.
     void close(StreamId id);
 
