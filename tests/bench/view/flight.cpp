@@ -152,15 +152,17 @@ class Flight {
         } else {
             figures_.twice += held_.insert(key).second ? 0U : 1U;
         }
-        const bool counts = ms_between(begun_, now) >= plan_.settle_seconds * 1000;
+        const auto counts = [&](Clock::time_point wanted) {
+            return ms_between(begun_, wanted) >= plan_.settle_seconds * 1000;
+        };
         if (const auto since = near_.find(key); since != near_.end()) {
-            if (counts) {
+            if (counts(since->second)) {
                 figures_.near_ms.push_back(ms_between(since->second, now));
             }
             near_.erase(since);
         }
         if (const auto since = wanted_.find(key); since != wanted_.end()) {
-            if (counts) {
+            if (counts(since->second)) {
                 figures_.wanted_ms.push_back(ms_between(since->second, now));
             }
             wanted_.erase(since);

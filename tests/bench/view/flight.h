@@ -36,7 +36,7 @@ struct FlightPlan {
     std::atomic<std::uint64_t>* received_bytes = nullptr;  ///< counted on, for who looks meanwhile
     std::function<void()> connected = {};                  ///< called then; may wait for others
     bool until_complete = false;  ///< end when nothing of the view is missing
-    double settle_seconds = 0;    ///< of figures before this only bytes are kept
+    double settle_seconds = 0;    ///< what was wanted before gives no times
 };
 
 struct FlightFigures {
