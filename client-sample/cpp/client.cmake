@@ -23,7 +23,7 @@ set(terrane_client_headers
     protocol/wire/frame.h protocol/wire/limits.h protocol/wire/messages.h
     generator/mesh/height_field.h generator/mesh/mesh.h generator/mesh/shade.h
     generator/mesh/surface_nets.h
-    generator/volume/chunk.h generator/volume/color.h generator/volume/limit.h
+    generator/volume/chunk.h generator/volume/color.h generator/volume/cut_columns.h generator/volume/limit.h
     generator/volume/stack.h generator/volume/voxel.h
     generator/world/composition.h generator/world/world_definition.h)
 foreach(header IN LISTS terrane_client_headers)

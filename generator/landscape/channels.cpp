@@ -10,6 +10,7 @@ namespace {
 
 constexpr float kBank = 1.5F;        ///< half widths: banks reach so far
 constexpr float kWet = 1.3F;         ///< half widths
+constexpr float kMeets = 3.0F;       ///< half widths: how far a river's level counts for others
 constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its river
 constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
 constexpr float kFar = 1e9F;
@@ -142,9 +143,10 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
             const float nearness = near.distance / near.half_width;
             out.nearness[i] = std::min(out.nearness[i], nearness);
             out.near_count[i] += nearness < kBank ? 1.0F : 0.0F;
-            if (nearness < kWet) {
-                // Where rivers meet, a mean that passes from one level to the other without a step.
-                const float weight = kWet - nearness;
+            if (nearness < kMeets) {
+                // Where rivers meet, a mean that passes from one level to the other without a step:
+                // over more than their width, or it would be a weir.
+                const float weight = (kMeets - nearness) * (kMeets - nearness);
                 out.water[i] =
                     (out.weight[i] > 0 ? out.water[i] : 0.0F) + weight * (near.level - kFreeboard);
                 out.weight[i] += weight;
@@ -160,7 +162,7 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
         });
     }
     for (std::size_t i = 0; i < size; ++i) {
-        const float river = out.weight[i] > 0 ? out.water[i] / out.weight[i] : kNoWater;
+        const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;
         const float water = std::max(river, constants.sea);
         out.water[i] = water > ground[i] ? water : kNoWater;
     }

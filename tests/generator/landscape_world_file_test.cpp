@@ -103,8 +103,8 @@ TEST(LandscapeWorldFile, RefusesItsPartsInFormat1) {
     EXPECT_THAT(faults_of(1,
                           "[relief]\nheight = 50\n[[material]]\nid = 9\nname = \"sea\"\n"
                           "color = \"#0000ff\"\nkind = \"water\"\n"),
-                ElementsAre("w.toml:46:1: relief: needs format = 2 at the file's head",
-                            "w.toml:52:8: material.kind: is \"water\"; such materials need format "
+                ElementsAre("w.toml:43:1: relief: needs format = 2 at the file's head",
+                            "w.toml:49:8: material.kind: is \"water\"; such materials need format "
                             "= 2 at the file's head"));
     EXPECT_THAT(faults_of(1, "hardness = 0.5\n"),
                 ElementsAre(::testing::HasSubstr("hardness: is not a known key")));
@@ -114,26 +114,26 @@ TEST(LandscapeWorldFile, RefusesWithPlaceAndReason) {
     EXPECT_THAT(
         faults_of(2, "[relief]\nheigth = 50\ncliffs = 0.9\ngully_octaves = 7\noverhang = 1.5\n"),
         ElementsAre(
-            "w.toml:47:1: relief.heigth: is not a known key; the nearest known one is "
+            "w.toml:44:1: relief.heigth: is not a known key; the nearest known one is "
             "\"height\"",
-            "w.toml:48:10: relief.cliffs: is 0.9; it must be a number from 0 to 0.8",
-            "w.toml:49:17: relief.gully_octaves: is 7; it must be an integer from 1 to 6",
-            "w.toml:50:12: relief.overhang: is a float; it must be an integer from 0 to 6"));
+            "w.toml:45:10: relief.cliffs: is 0.9; it must be a number from 0 to 0.8",
+            "w.toml:46:17: relief.gully_octaves: is 7; it must be an integer from 1 to 6",
+            "w.toml:47:12: relief.overhang: is a float; it must be an integer from 0 to 6"));
     EXPECT_THAT(faults_of(2, "[caves]\ncell = 8\nradius = 0\n"),
-                ElementsAre("w.toml:47:8: caves.cell: is 8; it must be 0 or from 32 to 512",
-                            "w.toml:48:10: caves.radius: is 0; it must be a number from 1 to 24"));
+                ElementsAre("w.toml:44:8: caves.cell: is 8; it must be 0 or from 32 to 512",
+                            "w.toml:45:10: caves.radius: is 0; it must be a number from 1 to 24"));
     EXPECT_THAT(faults_of(2, "[structure]\nlift = 1\nfault_dip = nan\n"),
-                ElementsAre("w.toml:47:8: structure.lift: is an integer; it must be true or false",
-                            "w.toml:48:13: structure.fault_dip: is nan; it must be a number from 1 "
+                ElementsAre("w.toml:44:8: structure.lift: is an integer; it must be true or false",
+                            "w.toml:45:13: structure.fault_dip: is nan; it must be a number from 1 "
                             "to 8"));
     EXPECT_THAT(faults_of(2, "hardness = 2\n"),
-                ElementsAre("w.toml:46:12: material.hardness: is 2; it must be a number from 0 to "
+                ElementsAre("w.toml:43:12: material.hardness: is 2; it must be a number from 0 to "
                             "1"));
     const std::string soil =
         "[[material]]\nid = 9\nname = \"a\"\ncolor = \"#0000ff\"\nkind = \"soil\"\n"
         "[[material]]\nid = 10\nname = \"b\"\ncolor = \"#0000ff\"\nkind = \"soil\"\n";
     EXPECT_THAT(faults_of(2, soil),
-                ElementsAre("w.toml:55:8: material.kind: is \"soil\" a second time; one such "
+                ElementsAre("w.toml:52:8: material.kind: is \"soil\" a second time; one such "
                             "material is allowed"));
 }
 
