@@ -34,7 +34,7 @@ struct ServerOptions {
     SessionTimeouts timeouts;
     HttpTimeouts http_timeouts = {};
     std::vector<ViewerFile> viewer_files = {};
-    SessionCaps caps;                          ///< of every session; clamped
+    SessionCaps caps = {};                     ///< of every session; clamped
     bool publish_world = true;                 ///< clients may have the world file
     std::optional<TlsServer::Files> tls = {};  ///< of both ports
     std::filesystem::path token_file = {};     ///< empty: none

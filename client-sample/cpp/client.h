@@ -54,8 +54,8 @@ struct ClientOptions {
     std::chrono::milliseconds timeout{
         5000};  ///< for connecting with its greeting, and for each sending
     std::string client_name = "terrane-client";
-    std::string token;
-    TlsUse tls;
+    std::string token = {};
+    TlsUse tls = {};
 };
 
 /// The payload is as received; chunk_reader.h makes a mesh or columns of it.

@@ -74,7 +74,10 @@ struct Connection::Socket {
         error_code no_address;
         asio::ip::make_address(host, no_address);
         if (no_address) {  // a name, which the server may have one certificate of several for
-            SSL_set_tlsext_host_name(tls->native_handle(), host.c_str());
+            // What the macro SSL_set_tlsext_host_name does, without its cast.
+            std::string name = host;
+            SSL_ctrl(tls->native_handle(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name,
+                     name.data());
         }
         error_code outcome = error;
         tls->async_handshake(asio::ssl::stream_base::client,

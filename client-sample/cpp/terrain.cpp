@@ -163,7 +163,7 @@ void Terrain::take_chunk(const ReceivedChunk& chunk, std::vector<TerrainChange>&
 void Terrain::take_forget(const ChunkForget& forget, std::vector<TerrainChange>& changes) {
     for (const ChunkPos key : forget.keys) {
         if (come_.erase(key) > 0) {
-            missing_ += is_wanted(key) ? 1 : 0;  // it will come again
+            missing_ += is_wanted(key) ? 1U : 0U;  // it will come again
             columns_.forget(key);
             meshed_.erase(key);
             changes.emplace_back(ChunkGone{.key = key});

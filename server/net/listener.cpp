@@ -48,7 +48,7 @@ struct Loop {
 struct Shared {
     const ListenOptions options;
     Admission admission;
-    TrafficCounters traffic;
+    TrafficCounters traffic = {};
     std::atomic<std::uint64_t> next_id = 1;
 
     void event(const std::string& text) const {

@@ -95,7 +95,7 @@ TEST(OpenApi, DescribesEveryRouteOfTheTableAndNoOther) {
     // What the server's own router has, viewer files apart.
     RouteContext context;
     const auto world = textured_world();
-    const ServerHello hello{.materials = {}};
+    const ServerHello hello;
     context.world = world.get();
     context.hello = &hello;
     context.world_file = "a world";
