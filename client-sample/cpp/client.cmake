@@ -16,23 +16,9 @@ install(TARGETS terrane_base terrane_wire terrane_generator terrane_client_libra
     FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/terrane COMPONENT client-internals
         EXCLUDE_FROM_ALL)
 # What terrane.h includes, and nothing else: no Boost, no FlatBuffers, no internals.
-set(terrane_client_headers
-    client-sample/cpp/chunk_reader.h client-sample/cpp/client.h client-sample/cpp/column_map.h
-    client-sample/cpp/connection.h client-sample/cpp/terrain.h client-sample/cpp/view_set.h
-    protocol/base/bytes.h protocol/base/coords.h protocol/base/hash.h protocol/base/result.h
-    protocol/wire/frame.h protocol/wire/limits.h protocol/wire/messages.h
-    generator/mesh/height_field.h generator/mesh/mesh.h generator/mesh/shade.h
-    generator/mesh/surface_nets.h
-    generator/volume/chunk.h generator/volume/color.h generator/volume/cut_columns.h generator/volume/limit.h
-    generator/volume/stack.h generator/volume/voxel.h
-    generator/world/composition.h generator/world/world_definition.h)
-foreach(header IN LISTS terrane_client_headers)
-    cmake_path(GET header PARENT_PATH folder)
-    install(FILES ${CMAKE_SOURCE_DIR}/${header} COMPONENT client
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/terrane/${folder})
-endforeach()
-install(FILES ${CMAKE_CURRENT_LIST_DIR}/terrane.h COMPONENT client
-    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/terrane)
+install(CODE "set(terrane_source \"${CMAKE_SOURCE_DIR}\")
+    set(terrane_include \"${CMAKE_INSTALL_INCLUDEDIR}\")" COMPONENT client)
+install(SCRIPT ${CMAKE_CURRENT_LIST_DIR}/package/install_headers.cmake COMPONENT client)
 install(TARGETS terrane-client RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/package/terraneConfig.cmake.in
     ${CMAKE_BINARY_DIR}/package/terraneConfig.cmake

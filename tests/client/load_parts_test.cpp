@@ -116,6 +116,18 @@ TEST(LoadReportTest, FairnessIsJains) {
     EXPECT_DOUBLE_EQ(jain_index(std::vector{1.0, 0.0, 0.0, 0.0}), 0.25);
 }
 
+TEST(LoadReportTest, RatesAreOfThoseThatCompete) {
+    LoadCounts counts;
+    counts.chunks = 300;
+    counts.wanting = 10s;
+    EXPECT_EQ(rate_of(counts, {.chunks = 100, .wanting = 5s}), 40);
+    EXPECT_EQ(rate_of(counts, {.chunks = 300, .wanting = 5s}), 0) << "starved";
+    counts.fill = 6s;
+    counts.fill_chunks = 200;
+    EXPECT_EQ(rate_of(counts, {.chunks = 100, .wanting = 5s}), 100);
+    EXPECT_FALSE(rate_of(counts, {.chunks = 250, .wanting = 8s})) << "whole before";
+}
+
 TEST(LoadReportTest, JsonHasWhatScriptsRead) {
     LoadResult result;
     LoadCounts counts;

@@ -38,7 +38,17 @@ void* operator new[](std::size_t size) {
     return allocate(size);
 }
 
+// std::stable_sort asks with this one and gives back with the plain delete: they must be a pair.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    ++allocations;
+    return std::malloc(size == 0 ? 1 : size);
+}
+
 void operator delete(void* memory) noexcept {
+    std::free(memory);
+}
+
+void operator delete(void* memory, const std::nothrow_t&) noexcept {
     std::free(memory);
 }
 

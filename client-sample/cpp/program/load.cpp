@@ -57,6 +57,7 @@ class LoadRun {
         bool is_open = false;  ///< connected, and not over
         bool is_over = false;
         bool is_hung = false;
+        LoadStart start;
     };
 
     void sample(const ChunkAnswer& answer, std::span<const std::byte> payload);
@@ -131,6 +132,9 @@ void LoadRun::start_clients(Clock::time_point now) {
         options_.ramp_seconds > 0 ? std::min(seconds / options_.ramp_seconds, 1.0) : 1.0;
     const auto due = std::max<std::size_t>(
         1, static_cast<std::size_t>(share * static_cast<double>(options_.clients)));
+    if (viewers_.size() == options_.clients) {
+        return;
+    }
     while (viewers_.size() < due) {
         const std::size_t i = viewers_.size();
         const MovementStart movement{
@@ -156,6 +160,12 @@ void LoadRun::start_clients(Clock::time_point now) {
         viewer.next_tick = now + kLoadStep;
         viewers_.push_back(std::move(viewer));
         viewers_.back().stream = loop_->connect();  // its id is its place in viewers_
+    }
+    if (viewers_.size() == options_.clients) {
+        for (Viewer& viewer : viewers_) {
+            const LoadCounts& counts = viewer.client->counts();
+            viewer.start = {.chunks = counts.chunks, .wanting = counts.wanting};
+        }
     }
 }
 
@@ -269,8 +279,8 @@ LoadResult LoadRun::finish() {
         const LoadCounts& counts = viewer.client->counts();
         add(result, counts);
         note(counts.first_fault);
-        if (counts.wanting.count() > 0) {
-            rates.push_back(rate_of(counts));
+        if (const auto rate = rate_of(counts, viewer.start)) {
+            rates.push_back(*rate);
         }
         result.hung += viewer.is_hung ? 1 : 0;
         if (!viewer.is_over && !viewer.is_hung && viewer.client->missing() > 0) {

@@ -218,7 +218,8 @@ void add_load_command(CLI::App& app, int& exit_code) {
     load->footer(
         "Latency is from the moment a chunk is wanted to the moment it is decoded. Fairness is\n"
         "Jain's index, and the least over the most, of the chunks that each client got a second\n"
-        "until its first view was whole. Wasted is what came after it had left the view.\n"
+        "from the end of the ramp until its first view was whole. Wasted is what came after it had "
+        "left the view.\n"
         "Exit code: 0 all came and was right, 1 something was wrong, refused, hung or cut off,\n"
         "2 wrong use.\n"
         "Examples:\n"

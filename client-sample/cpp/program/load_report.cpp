@@ -58,12 +58,14 @@ double jain_index(std::span<const double> rates) {
     return squares > 0 ? sum * sum / (static_cast<double>(rates.size()) * squares) : 1;
 }
 
-double rate_of(const LoadCounts& counts) {
-    if (counts.fill) {
-        return per_second(counts.fill_chunks, std::chrono::duration<double>(*counts.fill).count());
+std::optional<double> rate_of(const LoadCounts& counts, const LoadStart& start) {
+    const std::uint64_t chunks = counts.fill ? counts.fill_chunks : counts.chunks;
+    const auto wanting = (counts.fill ? *counts.fill : counts.wanting) - start.wanting;
+    if (chunks <= start.chunks || wanting.count() <= 0) {
+        // Served to the end before it counted, or starved from then on.
+        return counts.fill ? std::nullopt : std::optional(0.0);
     }
-    const double seconds = std::chrono::duration<double>(counts.wanting).count();
-    return per_second(counts.chunks, seconds);
+    return per_second(chunks - start.chunks, std::chrono::duration<double>(wanting).count());
 }
 
 std::string load_json(const LoadResult& r) {

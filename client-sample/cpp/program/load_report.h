@@ -45,9 +45,16 @@ void add(LoadResult& result, const LoadCounts& counts);
 /// Jain's index, (sum x)^2 / (n sum x^2): 1 when all are equal, 1/n when one has all. 1 for nobody.
 double jain_index(std::span<const double> rates);
 
-/// Chunks that a client got a second until its first view was whole, or while it wanted any if that
-/// never was: what fairness is about. Later a client wants little, and its rate says nothing.
-double rate_of(const LoadCounts& counts);
+/// Where a client stood when the last client had come: from then on all compete.
+struct LoadStart {
+    std::uint64_t chunks = 0;
+    std::chrono::microseconds wanting{};
+};
+
+/// Chunks that a client got a second from then on until its first view was whole, or as long as it
+/// wanted any if that never was: what fairness is about. Nothing if its view was whole before, for
+/// it did not compete: later a client wants little, and its rate says nothing.
+std::optional<double> rate_of(const LoadCounts& counts, const LoadStart& start);
 
 std::string load_json(const LoadResult& result);
 std::string load_text(const LoadResult& result);
