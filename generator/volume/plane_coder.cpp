@@ -307,18 +307,18 @@ constexpr std::uint32_t mark_of(std::size_t bytes) {
     return (1U << (8U * bytes)) - 1;
 }
 
-/// The codes at or above the mark. `low_bytes` are what was written of all: an escape's is 255.
-void put_escapes(Bytes& out, std::span<const std::uint8_t> low_bytes, const std::uint32_t* codes,
+/// The codes at or above the mark. `low_begin` is where in `out` the `count` low bytes of all
+/// begin: an escape's is 255.
+void put_escapes(Bytes& out, std::size_t low_begin, const std::uint32_t* codes, std::size_t count,
                  std::uint32_t mark, std::uint32_t escapes) {
     constexpr std::size_t kVarint32BytesMax = 5;
     std::array<std::byte, kPlaneSideMax * kVarint32BytesMax> bytes;
     std::size_t size = 0;
-    const std::uint8_t* at = low_bytes.data();
-    const std::uint8_t* const end = at + low_bytes.size();
-    for (; escapes > 0; ++at) {
-        at = static_cast<const std::uint8_t*>(
-            std::memchr(at, 0xFF, static_cast<std::size_t>(end - at)));
-        std::uint32_t code = codes[at - low_bytes.data()];
+    for (std::size_t i = 0; escapes > 0; ++i) {
+        const std::byte* const low = out.data() + low_begin;  // an insertion below may move it
+        const void* const found = std::memchr(low + i, 0xFF, count - i);
+        i = static_cast<std::size_t>(static_cast<const std::byte*>(found) - low);
+        std::uint32_t code = codes[i];
         if (code < mark) {
             continue;
         }
@@ -537,6 +537,7 @@ void encode_heights(Bytes& out, const PlaneView& plane, PlaneCodes& scratch) {
     if (width == 2) {
         escapes = count_escapes(codes, count, mark_of(2));
     }
+    const std::size_t low_begin = out.size() + 1;
     std::uint8_t* to = grow(out, 1 + width * count);
     *to++ = static_cast<std::uint8_t>((order == PlaneOrder::second ? kHeadSecondOrder : 0) |
                                       (width == 2 ? kHeadTwoBytes : 0));
@@ -544,7 +545,7 @@ void encode_heights(Bytes& out, const PlaneView& plane, PlaneCodes& scratch) {
     if (width == 2) {
         put_bytes(to + count, codes, count, mark_of(width), 8);
     }
-    put_escapes(out, {to, count}, codes, mark_of(width), escapes);
+    put_escapes(out, low_begin, codes, count, mark_of(width), escapes);
 }
 
 bool decode_heights(const PlaneView& plane, ByteReader& in) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <ostream>
 #include <string>
 
 namespace terrane {
@@ -22,6 +23,11 @@ struct Refusal {
     const char* replacement;
     const char* fault;
 };
+
+/// The test's name has no address in it, so that it is the same in every run.
+void PrintTo(const Refusal& refusal, std::ostream* out) {
+    *out << refusal.name;
+}
 
 class WorldFileRefuses : public ::testing::TestWithParam<Refusal> {};
 

@@ -142,7 +142,11 @@ struct SessionFixture {
     void settle() {
         for (;;) {
             mailbox.run_posted();
-            // When the worker has answered this, it has told of everything before.
+            if (service->in_flight() > 0) {
+                std::this_thread::yield();
+                continue;
+            }
+            // When the only worker has answered this, it has told of all that it took before.
             std::binary_semaphore reached(0);
             const auto asked =
                 service->request(ColumnPos{.x = std::int64_t{1} << 30U, .z = 0}, -1'000'000'000,
@@ -153,6 +157,7 @@ struct SessionFixture {
                 continue;
             }
             reached.acquire();
+            ++settle_builds;
             if (mailbox.run_posted() == 0 && service->in_flight() == 0) {
                 return;
             }
@@ -185,6 +190,7 @@ struct SessionFixture {
     }
 
     Gate gate;
+    int settle_builds = 0;  ///< of gate.builds, those that settle asked for
     ServiceCounters counters;
     std::optional<ChunkService> service;
     SessionContext context;
