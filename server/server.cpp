@@ -329,6 +329,10 @@ std::vector<MetricSample> Server::Impl::samples() {
     counter("terrane_stack_hits_total", "Stacks found in memory", counters.stack_hits);
     gauge("terrane_queue_jobs", "Stacks that wait for a worker", service.queued_jobs());
     gauge("terrane_in_flight_keys", "Keys that wait or are being made", service.in_flight());
+    gauge("terrane_oldest_in_flight_seconds", "How long the oldest such key has been wanted",
+          std::chrono::duration<double>(service.oldest_in_flight()).count());
+    counter("terrane_credit_stalls_total", "Times a view began to wait for its client's credit",
+            counters.credit_stalls);
     gauge("terrane_cache_bytes", "Encoded chunks in memory", service.cache_bytes());
     gauge("terrane_stack_cache_bytes", "Stacks in memory", stacks.size_bytes());
     const StoreStats stats = store->stats();
@@ -339,6 +343,13 @@ std::vector<MetricSample> Server::Impl::samples() {
         stats.corrupt + count_of(counters.store_corrupt));
     add(Kind::counter, "terrane_store_failures_total", "Reads or writes that the disk refused",
         stats.failures);
+    gauge("terrane_store_disk_bytes", "The store's tables", stats.disk_bytes);
+    gauge("terrane_store_memtable_bytes", "Written, and not yet in a table", stats.memtable_bytes);
+    gauge("terrane_store_block_cache_bytes", "Blocks of tables in memory", stats.block_cache_bytes);
+    gauge("terrane_store_pending_compaction_bytes", "What merging tables has yet to read",
+          stats.pending_compaction_bytes);
+    gauge("terrane_store_stalled_writes", "1 while the store slows or stops writes to catch up",
+          stats.stalled_writes);
     if (listener) {
         const TrafficCounters& traffic = listener->traffic();
         gauge("terrane_sessions", "Connections that are open", listener->sessions());

@@ -99,6 +99,7 @@ void keep_for_ever(rocksdb::DB* db, std::vector<rocksdb::ColumnFamilyHandle*> fa
         rocksdb::DB* db;
         std::vector<rocksdb::ColumnFamilyHandle*> families;
     };
+
     static Mutex mutex;
     static auto* const kept = new std::vector<Kept>;
     const MutexLock lock(mutex);
@@ -382,14 +383,36 @@ class RocksdbStore final : public ChunkStore {
     }
 
     StoreStats stats() const override {
+        using Properties = rocksdb::DB::Properties;
+        const std::uint64_t delay = property(Properties::kActualDelayedWriteRate);
+        const std::uint64_t stop = property(Properties::kIsWriteStopped);
         return {.gets = gets_,
                 .hits = hits_,
                 .puts = puts_,
                 .corrupt = corrupt_,
-                .failures = failures_ + database_->errors->count()};
+                .failures = failures_ + database_->errors->count(),
+                .disk_bytes = property(Properties::kTotalSstFilesSize),
+                .memtable_bytes = property(Properties::kCurSizeAllMemTables),
+                .block_cache_bytes =
+                    property_of(*database_->families[family_stacks], Properties::kBlockCacheUsage),
+                .pending_compaction_bytes = property(Properties::kEstimatePendingCompactionBytes),
+                .stalled_writes = delay > 0 || stop > 0 ? 1U : 0U};
     }
 
   private:
+    std::uint64_t property_of(rocksdb::ColumnFamilyHandle& family, const std::string& name) const {
+        std::uint64_t value = 0;
+        database_->db->GetIntProperty(&family, name, &value);
+        return value;
+    }
+
+    /// The sum over all column families.
+    std::uint64_t property(const std::string& name) const {
+        std::uint64_t value = 0;
+        database_->db->GetAggregatedIntProperty(name, &value);
+        return value;
+    }
+
     rocksdb::ColumnFamilyHandle* family_of(const RecordKey& key) const {
         return database_->families[key.family == Family::stacks ? family_stacks : family_meshes];
     }

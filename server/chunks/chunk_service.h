@@ -74,7 +74,12 @@ class ChunkService {
     /// Different keys pending or running.
     std::size_t in_flight() const { return in_flight_.size(); }
 
+    /// How long the oldest of them has been wanted.
+    std::chrono::steady_clock::duration oldest_in_flight() const { return in_flight_.oldest(); }
+
     std::size_t queued_jobs() const { return queue_.size(); }
+
+    ServiceCounters& counters() const { return counters_; }
 
     std::size_t cache_bytes() { return cache_.size_bytes(); }
 

@@ -21,6 +21,7 @@ struct ServiceCounters {
     Counter busy{0};            ///< requests refused at a limit
     Counter cancelled{0};       ///< pieces of work that nobody wanted any more
     Counter failed{0};          ///< pieces of work that ended in an error
+    Counter credit_stalls{0};   ///< times that a view began to wait for its client's credit
 };
 
 inline void raise(Counter& counter) {

@@ -199,6 +199,16 @@ std::size_t InFlight::size() const {
     return entries_.size();
 }
 
+std::chrono::steady_clock::duration InFlight::oldest() const {
+    const auto now = std::chrono::steady_clock::now();
+    auto oldest = now;
+    const MutexLock lock(mutex_);
+    for (const auto& [key, entry] : entries_) {
+        oldest = std::min(oldest, entry.asked);
+    }
+    return now - oldest;
+}
+
 std::vector<Waiter> InFlight::take_entry(const WorkKey& key) {
     const auto found = entries_.find(key);
     std::vector<Waiter> waiters = std::move(found->second.waiters);

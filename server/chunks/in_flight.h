@@ -106,6 +106,8 @@ class InFlight {
     std::vector<Waiter> abandon_all();
     /// Different keys pending or running.
     std::size_t size() const;
+    /// How long the oldest of them has been wanted; 0 if there is none.
+    std::chrono::steady_clock::duration oldest() const;
 
   private:
     struct Entry {

@@ -291,6 +291,11 @@ void Session::submit() {
         answered += (is_of_view ? submit_of_view() : submit_request()) ? 1U : 0U;
     }
     const bool view_wishes = view_ && view_->has_wish();
+    const bool is_stalled = view_wishes && !view_has_credit();
+    if (is_stalled && !is_stalled_) {
+        raise(context_.service->counters().credit_stalls);
+    }
+    is_stalled_ = is_stalled;
     if (!byte_rate_.has() && (view_wishes || !waiting_.empty())) {
         wake_at_ = byte_rate_.ready_at();
     } else if (view_wishes && view_retry_at_ && *view_retry_at_ > now_) {

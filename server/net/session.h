@@ -160,6 +160,7 @@ class Session : public std::enable_shared_from_this<Session> {
     void deliver(WaiterId waiter, const Result<Answer>& result);
     void go_on_later();
 
+    bool view_has_credit() const;
     bool view_may_ask() const;
     bool view_is_next() const;
     bool submit_of_view();
@@ -197,6 +198,7 @@ class Session : public std::enable_shared_from_this<Session> {
     ViewUpdate last_update_;  ///< without its radii
     std::size_t view_under_way_ = 0;
     std::size_t uncredited_bytes_ = 0;
+    bool is_stalled_ = false;  ///< its next wish waits for credit
     bool view_waits_ = false;  ///< its last wish found no room: until something changes
     std::optional<Clock::time_point> view_retry_at_;  ///< the service was busy
     TokenBucket byte_rate_;

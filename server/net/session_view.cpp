@@ -122,15 +122,20 @@ void Session::tell_forgotten() {
     }
 }
 
-/// Credit for the answers that are expected; has_room has looked at everything else.
+/// Credit for the answers that are expected.
+bool Session::view_has_credit() const {
+    const std::size_t expected_bytes = (view_under_way_ + 1) * expected_bytes_;
+    return uncredited_bytes_ + expected_bytes <= caps_.credit_window_bytes ||
+           (uncredited_bytes_ == 0 && view_under_way_ == 0);
+}
+
+/// has_room has looked at everything but the view's own state and credit.
 bool Session::view_may_ask() const {
     if (stage_ != Stage::open || !view_ || !view_->has_wish() || view_->has_forgotten() ||
         view_waits_ || (view_retry_at_ && now_ < *view_retry_at_)) {
         return false;
     }
-    const std::size_t expected_bytes = (view_under_way_ + 1) * expected_bytes_;
-    return uncredited_bytes_ + expected_bytes <= caps_.credit_window_bytes ||
-           (uncredited_bytes_ == 0 && view_under_way_ == 0);
+    return view_has_credit();
 }
 
 bool Session::view_is_next() const {

@@ -156,6 +156,7 @@ TEST(HttpServer, CountsWhatItDoes) {
           "terrane_stage_seconds_count{stage=\"generate\"} 1\n", "terrane_sessions 1\n",
           "terrane_http_answers_total{status=\"2xx\"} 2\n",
           "terrane_http_answers_total{status=\"4xx\"} 1\n", "terrane_queue_jobs 0\n",
+          "terrane_oldest_in_flight_seconds 0\n", "terrane_credit_stalls_total 0\n",
           "# TYPE terrane_sent_bytes_total counter\n"}) {
         EXPECT_THAT(reply->body, HasSubstr(line));
     }

@@ -32,6 +32,22 @@ TEST(InFlight, OneKeyIsOneTaskHoweverManyWait) {
     EXPECT_EQ(table.size(), 0U);
 }
 
+TEST(InFlight, TheOldestIsAsOldAsItsFirstAsking) {
+    InFlight table(kRoomy);
+    EXPECT_EQ(table.oldest().count(), 0);
+    const auto before = std::chrono::steady_clock::now();
+    const auto first = admit(table, chunk(0, 0), 1);
+    const auto between = std::chrono::steady_clock::now();
+    admit(table, chunk(1, 0), 2);
+    const auto oldest = table.oldest();
+    EXPECT_GE(oldest, std::chrono::steady_clock::duration::zero());
+    EXPECT_LE(oldest, std::chrono::steady_clock::now() - before);
+    const auto task = table.next(first.job);
+    ASSERT_TRUE(task);
+    table.finish(*task);
+    EXPECT_LE(table.oldest(), std::chrono::steady_clock::now() - between) << "the second's";
+}
+
 TEST(InFlight, OneStackIsOneJobInTheOrderOfAsking) {
     InFlight table(kRoomy);
     const auto first = admit(table, chunk(0, 3), 1);

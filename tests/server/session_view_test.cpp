@@ -120,6 +120,7 @@ TEST(SessionView, SendsNoMoreThanTheCreditWindow) {
     f.look(16, {4});
     f.settle();
     f.take();
+    EXPECT_EQ(count_of(f.counters.credit_stalls), 1U);
     EXPECT_LE(f.held.size(), 10U);
     EXPECT_GE(f.held.size(), 6U) << "the first answers are expected to be larger";
     EXPECT_EQ(f.session->uncredited_bytes(), f.payload_bytes);

@@ -133,6 +133,28 @@ TEST_F(RocksdbStoreTest, KeepsRecordsFromOneOpeningToTheNext) {
     EXPECT_EQ(notices_, "");
 }
 
+TEST_F(RocksdbStoreTest, TellsWhatTheDatabaseHolds) {
+    std::uint64_t memtable_bytes = 0;
+    {
+        const auto store = open();
+        ASSERT_TRUE(store);
+        const std::uint64_t empty = (*store)->stats().memtable_bytes;
+        for (std::int32_t x = 0; x < 100; ++x) {
+            put(**store, stack_at(x), sample_value(x));
+        }
+        memtable_bytes = (*store)->stats().memtable_bytes;
+        EXPECT_GE(memtable_bytes, empty + 400'000);
+        EXPECT_EQ((*store)->stats().stalled_writes, 0U);
+    }
+    const auto again = open();
+    ASSERT_TRUE(again);
+    EXPECT_EQ(text((*again)->get(stack_at(5))), sample_value(5));
+    const StoreStats stats = (*again)->stats();
+    EXPECT_LT(stats.memtable_bytes, memtable_bytes) << "tables now";
+    EXPECT_GE(stats.disk_bytes, 400'000U);
+    EXPECT_GT(stats.block_cache_bytes, 0U);
+}
+
 TEST_F(RocksdbStoreTest, RefusesAnotherWorldNamesBothAndKeepsTheRecords) {
     make_store();
     const std::string message = refusal(open(identity(77)), ErrorCode::wrong_world);
