@@ -1,6 +1,7 @@
 // terrane serve as a process of its own: what it prints, how it stops, its exit codes.
 #include "protocol/wire/messages.h"
 #include "server/cli/program.h"
+#include "server/net/tokens.h"
 #include "tests/server/raw_client.h"
 
 #include <gtest/gtest.h>
@@ -158,6 +159,34 @@ TEST(Serve, ASecondSignalEndsAtOnce) {
     const int status = serve.wait();
     ASSERT_TRUE(WIFSIGNALED(status));
     EXPECT_EQ(WTERMSIG(status), SIGTERM);
+}
+
+TEST(Serve, ReadsItsTokensAgainAtSighup) {
+    const Folder folder;
+    const std::filesystem::path tokens = folder.path / "tokens.toml";
+    ASSERT_TRUE(add_token(tokens, {.name = "first", .hash = sha256_of("one"), .caps = {}}));
+    const ServeProcess serve({"--world", world_path(), "--store", "memory", "--log-level", "off",
+                              "--tokens", tokens.string(), "--anonymous", "no"});
+    const auto lets_in = [&](const std::string& token) {
+        RawClient client(serve.port());
+        client.send(ClientHello{.protocol_version = kProtocolVersion,
+                                .client_name = "raw",
+                                .token = token,
+                                .formats = {}});
+        const auto answer = client.next();
+        return answer && std::holds_alternative<ServerHello>(answer->message);
+    };
+    EXPECT_TRUE(lets_in("one"));
+    EXPECT_FALSE(lets_in("two"));
+    ASSERT_TRUE(add_token(tokens, {.name = "second", .hash = sha256_of("two"), .caps = {}}));
+    EXPECT_FALSE(lets_in("two")) << "not before it is told";
+    serve.signal(SIGHUP);
+    bool is_in = false;
+    for (int attempt = 0; attempt < 1000 && !is_in; ++attempt) {  // a signal has no answer
+        is_in = lets_in("two");
+    }
+    EXPECT_TRUE(is_in);
+    EXPECT_TRUE(lets_in("one"));
 }
 
 TEST(Serve, SaysWhereItListensAndWhichWorldItIs) {
