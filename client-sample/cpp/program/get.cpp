@@ -1,6 +1,7 @@
 #include "client-sample/cpp/program/get.h"
 
 #include "client-sample/cpp/chunk_reader.h"
+#include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get_report.h"
 #include "client-sample/cpp/program/obj.h"
 #include "client-sample/cpp/program/program.h"
@@ -278,9 +279,6 @@ Result<GetOptions> understood(const GetFlags& flags) {
         return fail(ErrorCode::invalid_argument,
                     "--obj: columns have no mesh; use --format draco or blocky");
     }
-    if (!options.tls.ca_file.empty() && !options.tls.enabled) {
-        return fail(ErrorCode::invalid_argument, "--ca: it needs --tls");
-    }
     // Not CLI::Range, which lets NaN pass.
     if (!(options.timeout_s >= kTimeoutMinS && options.timeout_s <= kTimeoutMaxS)) {
         return fail(ErrorCode::invalid_argument, "--timeout: 0.001 to 86400 seconds are possible");
@@ -304,13 +302,7 @@ void add_get_command(CLI::App& app, int& exit_code) {
     get->add_option("--server", flags->server, "Where the server listens")
         ->type_name("HOST:PORT")
         ->capture_default_str();
-    get->add_option("--token", flags->options.token, "Lets you in where a server asks for one")
-        ->envname("TERRANE_TOKEN");
-    get->add_flag("--tls", flags->options.tls.enabled,
-                  "Speak TLS, and check that the server's certificate is good for HOST");
-    get->add_option("--ca", flags->options.tls.ca_file,
-                    "PEM certificates to trust instead of the system's")
-        ->type_name("FILE");
+    add_door_flags(*get, flags->options.token, flags->options.tls);
     get->add_option(
            "--lod", flags->lod,
            "Level of detail, 0..17: every 2^L-th column; above 0 a chunk is its columns' whole "

@@ -1,5 +1,6 @@
 #include "client-sample/cpp/program/view.h"
 
+#include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get.h"
 #include "client-sample/cpp/program/program.h"
 #include "protocol/base/write_file.h"
@@ -122,6 +123,7 @@ struct ViewFlags {
     std::string form = "draco";
     std::vector<std::uint32_t> radius_chunks = {8, 8, 8, 8, 8, 8};
     std::string token;
+    TlsUse tls;
     std::string out;
     double timeout_seconds = 120;
 };
@@ -146,7 +148,8 @@ int run_view(const ViewFlags& flags) {
                       .port = address->port,
                       .timeout = timeout,
                       .client_name = "terrane-client view",
-                      .token = flags.token};
+                      .token = flags.token,
+                      .tls = flags.tls};
     options.form = flags.form == "columns"  ? TerrainForm::columns
                    : flags.form == "blocky" ? TerrainForm::blocky
                                             : TerrainForm::draco;
@@ -216,7 +219,7 @@ void add_view_command(CLI::App& app, int& exit_code) {
                      "blocks, level 0 only")
         ->check(CLI::IsMember({"draco", "columns", "blocky"}))
         ->capture_default_str();
-    view->add_option("--token", flags->token, "For a server that asks for one");
+    add_door_flags(*view, flags->token, flags->tls);
     view->add_option("--timeout", flags->timeout_seconds, "Give up after this long, seconds")
         ->check(CLI::Range(0.1, 86400.0))
         ->capture_default_str();
