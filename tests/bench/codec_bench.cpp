@@ -154,6 +154,8 @@ const bench::RatioEntry kEncodeRatio{
      .denominator = "generate_stacks",
      .bar = 4.0}};
 
+constexpr std::int32_t kHighVoxels = 256;
+
 /// The 256-high world: `density` of veins and caves in hundredths.
 void generate_high(benchmark::State& state) {
     const auto world = bench::high_world(static_cast<double>(state.range(0)) / 100);
@@ -179,22 +181,37 @@ std::vector<Stack> high_stacks(double density) {
     return stacks;
 }
 
-void encode_high(benchmark::State& state) {
+/// The whole height as one chunk, as a client of columns gets it.
+void encode_high(benchmark::State& state, FlowPlane flow) {
     const std::vector<Stack> stacks = high_stacks(static_cast<double>(state.range(0)) / 100);
+    std::vector<Chunk> chunks(stacks.size());
+    for (std::size_t i = 0; i < stacks.size(); ++i) {
+        cut_chunk(chunks[i], stacks[i], 0, kHighVoxels);
+    }
+    ChunkEncoder encoder;
     std::vector<Bytes> records(stacks.size());
     std::size_t i = 0;
     for (auto _ : state) {
-        encode_stack(records[i % stacks.size()], stacks[i % stacks.size()]);
+        encoder.encode(records[i % stacks.size()], chunks[i % stacks.size()], flow);
         ++i;
     }
     for (std::size_t stack = 0; stack < stacks.size(); ++stack) {
-        encode_stack(records[stack], stacks[stack]);
+        encoder.encode(records[stack], chunks[stack], flow);
     }
     count_sizes(state, records, columns_of(stacks));
+    state.counters["zstd1_per_voxel"] =
+        state.counters["zstd1"].value / static_cast<double>(kHighVoxels);
 }
 
+const bench::RatioEntry kEncodeHighRatio{
+    {.what = "encode a 256-high stack as chunk bytes, without flow / generate it",
+     .numerators = {"encode_high/without_flow/0"},
+     .denominator = "generate_high/0",
+     .bar = 0.5}};
+
 BENCHMARK(generate_high)->Arg(0)->Arg(25);
-BENCHMARK(encode_high)->Arg(0)->Arg(25);
+BENCHMARK_CAPTURE(encode_high, with_flow, FlowPlane::with)->Arg(0)->Arg(25);
+BENCHMARK_CAPTURE(encode_high, without_flow, FlowPlane::without)->Arg(0)->Arg(25);
 BENCHMARK(generate_stacks);
 BENCHMARK(encode_stacks);
 BENCHMARK(decode_stacks);
