@@ -7,8 +7,8 @@ import { Xray } from './inside/xray';
 import { httpBase, parseCoordinates, readPlace, webSocketUrl, writePlace } from './place';
 import { Controls } from './scene/controls';
 import { GroundMap } from './scene/ground_map';
-import { QualityControl } from './scene/quality';
-import { Stage } from './scene/stage';
+import { QUALITIES, QualityControl } from './scene/quality';
+import { FIELD_OF_VIEW_DEGREES, Stage } from './scene/stage';
 import { TerrainMaterials } from './scene/terrain_material';
 import { TileSet } from './scene/tile_set';
 import type { FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
@@ -22,7 +22,10 @@ const PLACE_PERIOD_MS = 700;
 const MAP_PERIOD_MS = 250;
 const FRAME_SECONDS_MAX = 0.1;
 const IDLE_FRAME_MS = 400;
-const CUT_AHEAD = 70;
+const CUT_AHEAD_MIN = 70;
+const CUT_AHEAD_MAX = 300;
+/** Radians below the picture's middle. */
+const CUT_BELOW_CENTER = 0.1;
 const COMPARED_SIDE = 5;
 
 /** All that belongs to the world of the session. */
@@ -77,6 +80,17 @@ export class Viewer {
         this.url = webSocketUrl(address, location);
         // First of all: the worker greets the server while this thread makes textures and programs.
         this.send({ kind: 'connect', url: this.url, token: query.get('token') ?? '' });
+        this.controls = new Controls(canvas);
+        const place = readPlace(location.hash);
+        this.hasPlace = place !== undefined;
+        if (place !== undefined) {
+            Object.assign(this.controls.position, { x: place.x, y: place.y, z: place.z });
+            this.controls.yaw = place.yaw;
+            this.controls.pitch = place.pitch;
+        }
+        this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
+        // Every quality wants at least this much: it is under way before the first picture can be drawn.
+        this.sendStream(QUALITIES[0]!.radiusChunks);
         this.stage = new Stage(canvas);
         const hour = Number(query.get('hour'));
         if (hour > 0) {
@@ -87,15 +101,6 @@ export class Viewer {
         document.body.classList.toggle('plain', this.stage.isSoftware);
         this.stage.setQuality(this.quality.now);
         this.materials = new TerrainMaterials(this.stage.textures, this.quality.now.detail);
-        this.controls = new Controls(canvas);
-        const place = readPlace(location.hash);
-        this.hasPlace = place !== undefined;
-        if (place !== undefined) {
-            Object.assign(this.controls.position, { x: place.x, y: place.y, z: place.z });
-            this.controls.yaw = place.yaw;
-            this.controls.pitch = place.pitch;
-        }
-        this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
         this.shell = new Shell(ui, this.actions(), this.stage.hour, address);
         this.panel = new FiguresPanel(() => this.compare());
         this.map = new MiniMap((x, z) => this.jump(x, undefined, z));
@@ -161,7 +166,11 @@ export class Viewer {
             this.send({ kind: 'sectionOff' });
             this.materials.setClip([]);
         } else {
-            cut.open(this.controls.position, this.controls.yaw, CUT_AHEAD);
+            // From high up the near ground is below the picture: the cut goes where the ground is seen.
+            const { x, y, z } = this.controls.position;
+            const over = y - (this.world?.ground.floorUnder(x, y, z, 1) ?? y);
+            const seenAt = over / Math.tan(Math.max(CUT_BELOW_CENTER - this.controls.pitch, CUT_BELOW_CENTER));
+            cut.open({ x, z }, this.controls.yaw, Math.min(Math.max(CUT_AHEAD_MIN, seenAt), CUT_AHEAD_MAX));
         }
         this.shell.press('cut', cut.isOn);
         this.shell.showTools(cut.isOn, cut.withFlow);
@@ -474,30 +483,35 @@ export class Viewer {
         if (this.world === undefined) {
             return;
         }
-        const { position, velocity } = this.controls;
-        const direction = this.controls.direction();
+        const { position } = this.controls;
         const { levels, limits } = this.world.hello;
         const most = limits.viewRadiusMax || Infinity;
         const radiusChunks = this.quality.now.radiusChunks.slice(0, levels).map((radius) => Math.min(radius, most));
         this.world.tiles.setView(position, radiusChunks);
-        const vector = ({ x, y, z }: { x: number; y: number; z: number }) => ({ x, y, z });
-        this.send({
-            kind: 'view',
-            view: {
-                position: vector(position),
-                direction: vector(direction),
-                velocity: vector(velocity),
-                fieldOfView: (this.stage.camera.fov * Math.PI) / 180 * Math.max(this.stage.camera.aspect, 1),
-                radiusChunks,
-                format: this.format,
-            },
-        });
+        this.sendStream(radiusChunks);
         const squares = this.world.ground.squaresAround(position.x, position.z);
         const asked = `${squares[0]!.x} ${squares[0]!.z}`;
         if (asked !== this.groundAsked) {
             this.groundAsked = asked;
             this.send({ kind: 'ground', squares });
         }
+    }
+
+    /** Tells the stream where the viewer is. */
+    private sendStream(radiusChunks: number[]): void {
+        const { position, velocity } = this.controls;
+        const vector = ({ x, y, z }: { x: number; y: number; z: number }) => ({ x, y, z });
+        this.send({
+            kind: 'view',
+            view: {
+                position: vector(position),
+                direction: vector(this.controls.direction()),
+                velocity: vector(velocity),
+                fieldOfView: (FIELD_OF_VIEW_DEGREES * Math.PI) / 180 * Math.max(window.innerWidth / window.innerHeight, 1),
+                radiusChunks,
+                format: this.format,
+            },
+        });
     }
 
     private frame(): void {
@@ -515,7 +529,7 @@ export class Viewer {
         const hasMoved = pose !== this.lastPose;
         this.lastPose = pose;
         if (world !== undefined) {
-            const isNew = world.tiles.update(seconds, position);
+            const isNew = world.tiles.update(Math.min(elapsed / 1000, 1), position);
             const { origin } = world.tiles;
             camera.position.set(position.x - origin.x, position.y, position.z - origin.z);
             world.xray.update(position, origin);
