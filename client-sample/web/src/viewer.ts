@@ -11,7 +11,7 @@ import { QUALITIES, QualityControl } from './scene/quality';
 import { FIELD_OF_VIEW_DEGREES, Stage } from './scene/stage';
 import { TerrainMaterials } from './scene/terrain_material';
 import { TileSet } from './scene/tile_set';
-import type { FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
+import type { Comparison, FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
 import { FiguresPanel } from './ui/figures_panel';
 import { MiniMap } from './ui/mini_map';
 import { ProbePanel } from './ui/probe_panel';
@@ -42,6 +42,8 @@ export class Viewer {
     world: World | undefined;
     readonly controls: Controls;
     figures: StreamFigures | undefined;
+    /** The last comparison of both formats. */
+    comparison: Comparison | null = null;
     /** Times since the page began, in ms. */
     readonly times = { hello: 0, firstTile: 0, nearView: 0 };
     framesDrawn = 0;
@@ -208,7 +210,7 @@ export class Viewer {
 
     /** What the scene holds, for the panel and for tests. */
     sceneFigures() {
-        const tiles = this.world?.tiles.figures() ?? { tiles: 0, shown: 0, triangles: 0, bytes: 0 };
+        const tiles = this.world?.tiles.figures() ?? { tiles: 0, shown: 0, triangles: 0, bytes: 0, isFading: false };
         const { position } = this.controls;
         return {
             ...tiles,
@@ -357,7 +359,8 @@ export class Viewer {
         this.send({ kind: 'connect', url: this.url, token: page.searchParams.get('token') ?? '' });
     }
 
-    private compare(): void {
+    /** Streams a field that nobody has seen in both formats and measures them. */
+    compare(): void {
         if (this.world === undefined) {
             return;
         }
@@ -417,6 +420,7 @@ export class Viewer {
                 this.showFigures(message.figures);
                 break;
             case 'comparison':
+                this.comparison = message.comparison;
                 this.panel.compare(message.comparison, message.error);
                 break;
         }

@@ -124,7 +124,7 @@ export class TileSet {
         return meshes;
     }
 
-    figures(): { tiles: number; shown: number; triangles: number; bytes: number } {
+    figures(): { tiles: number; shown: number; triangles: number; bytes: number; isFading: boolean } {
         let shown = 0;
         let triangles = 0;
         let bytes = 0;
@@ -133,7 +133,7 @@ export class TileSet {
             triangles += tile.isShown ? tile.triangles : 0;
             bytes += tile.bytes;
         }
-        return { tiles: this.tiles.size, shown, triangles, bytes };
+        return { tiles: this.tiles.size, shown, triangles, bytes, isFading: this.isFading || this.isDirty };
     }
 
     /** Whether the ground under a point is drawn, at any level. */
