@@ -7,11 +7,11 @@ import { Xray } from './inside/xray';
 import { httpBase, parseCoordinates, readPlace, webSocketUrl, writePlace } from './place';
 import { Controls } from './scene/controls';
 import { GroundMap } from './scene/ground_map';
-import { QualityControl } from './scene/quality';
-import { Stage } from './scene/stage';
+import { QUALITIES, QualityControl } from './scene/quality';
+import { FIELD_OF_VIEW_DEGREES, Stage } from './scene/stage';
 import { TerrainMaterials } from './scene/terrain_material';
 import { TileSet } from './scene/tile_set';
-import type { FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
+import type { Comparison, FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
 import { FiguresPanel } from './ui/figures_panel';
 import { MiniMap } from './ui/mini_map';
 import { ProbePanel } from './ui/probe_panel';
@@ -22,7 +22,10 @@ const PLACE_PERIOD_MS = 700;
 const MAP_PERIOD_MS = 250;
 const FRAME_SECONDS_MAX = 0.1;
 const IDLE_FRAME_MS = 400;
-const CUT_AHEAD = 70;
+const CUT_AHEAD_MIN = 70;
+const CUT_AHEAD_MAX = 300;
+/** Radians below the picture's middle. */
+const CUT_BELOW_CENTER = 0.1;
 const COMPARED_SIDE = 5;
 
 /** All that belongs to the world of the session. */
@@ -39,6 +42,8 @@ export class Viewer {
     world: World | undefined;
     readonly controls: Controls;
     figures: StreamFigures | undefined;
+    /** The last comparison of both formats. */
+    comparison: Comparison | null = null;
     /** Times since the page began, in ms. */
     readonly times = { hello: 0, firstTile: 0, nearView: 0 };
     framesDrawn = 0;
@@ -77,6 +82,17 @@ export class Viewer {
         this.url = webSocketUrl(address, location);
         // First of all: the worker greets the server while this thread makes textures and programs.
         this.send({ kind: 'connect', url: this.url, token: query.get('token') ?? '' });
+        this.controls = new Controls(canvas);
+        const place = readPlace(location.hash);
+        this.hasPlace = place !== undefined;
+        if (place !== undefined) {
+            Object.assign(this.controls.position, { x: place.x, y: place.y, z: place.z });
+            this.controls.yaw = place.yaw;
+            this.controls.pitch = place.pitch;
+        }
+        this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
+        // Every quality wants at least this much: it is under way before the first picture can be drawn.
+        this.sendStream(QUALITIES[0]!.radiusChunks);
         this.stage = new Stage(canvas);
         const hour = Number(query.get('hour'));
         if (hour > 0) {
@@ -87,15 +103,6 @@ export class Viewer {
         document.body.classList.toggle('plain', this.stage.isSoftware);
         this.stage.setQuality(this.quality.now);
         this.materials = new TerrainMaterials(this.stage.textures, this.quality.now.detail);
-        this.controls = new Controls(canvas);
-        const place = readPlace(location.hash);
-        this.hasPlace = place !== undefined;
-        if (place !== undefined) {
-            Object.assign(this.controls.position, { x: place.x, y: place.y, z: place.z });
-            this.controls.yaw = place.yaw;
-            this.controls.pitch = place.pitch;
-        }
-        this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
         this.shell = new Shell(ui, this.actions(), this.stage.hour, address);
         this.panel = new FiguresPanel(() => this.compare());
         this.map = new MiniMap((x, z) => this.jump(x, undefined, z));
@@ -161,7 +168,11 @@ export class Viewer {
             this.send({ kind: 'sectionOff' });
             this.materials.setClip([]);
         } else {
-            cut.open(this.controls.position, this.controls.yaw, CUT_AHEAD);
+            // From high up the near ground is below the picture: the cut goes where the ground is seen.
+            const { x, y, z } = this.controls.position;
+            const over = y - (this.world?.ground.floorUnder(x, y, z, 1) ?? y);
+            const seenAt = over / Math.tan(Math.max(CUT_BELOW_CENTER - this.controls.pitch, CUT_BELOW_CENTER));
+            cut.open({ x, z }, this.controls.yaw, Math.min(Math.max(CUT_AHEAD_MIN, seenAt), CUT_AHEAD_MAX));
         }
         this.shell.press('cut', cut.isOn);
         this.shell.showTools(cut.isOn, cut.withFlow);
@@ -199,7 +210,7 @@ export class Viewer {
 
     /** What the scene holds, for the panel and for tests. */
     sceneFigures() {
-        const tiles = this.world?.tiles.figures() ?? { tiles: 0, shown: 0, triangles: 0, bytes: 0 };
+        const tiles = this.world?.tiles.figures() ?? { tiles: 0, shown: 0, triangles: 0, bytes: 0, isFading: false };
         const { position } = this.controls;
         return {
             ...tiles,
@@ -348,7 +359,8 @@ export class Viewer {
         this.send({ kind: 'connect', url: this.url, token: page.searchParams.get('token') ?? '' });
     }
 
-    private compare(): void {
+    /** Streams a field that nobody has seen in both formats and measures them. */
+    compare(): void {
         if (this.world === undefined) {
             return;
         }
@@ -408,6 +420,7 @@ export class Viewer {
                 this.showFigures(message.figures);
                 break;
             case 'comparison':
+                this.comparison = message.comparison;
                 this.panel.compare(message.comparison, message.error);
                 break;
         }
@@ -474,30 +487,35 @@ export class Viewer {
         if (this.world === undefined) {
             return;
         }
-        const { position, velocity } = this.controls;
-        const direction = this.controls.direction();
+        const { position } = this.controls;
         const { levels, limits } = this.world.hello;
         const most = limits.viewRadiusMax || Infinity;
         const radiusChunks = this.quality.now.radiusChunks.slice(0, levels).map((radius) => Math.min(radius, most));
         this.world.tiles.setView(position, radiusChunks);
-        const vector = ({ x, y, z }: { x: number; y: number; z: number }) => ({ x, y, z });
-        this.send({
-            kind: 'view',
-            view: {
-                position: vector(position),
-                direction: vector(direction),
-                velocity: vector(velocity),
-                fieldOfView: (this.stage.camera.fov * Math.PI) / 180 * Math.max(this.stage.camera.aspect, 1),
-                radiusChunks,
-                format: this.format,
-            },
-        });
+        this.sendStream(radiusChunks);
         const squares = this.world.ground.squaresAround(position.x, position.z);
         const asked = `${squares[0]!.x} ${squares[0]!.z}`;
         if (asked !== this.groundAsked) {
             this.groundAsked = asked;
             this.send({ kind: 'ground', squares });
         }
+    }
+
+    /** Tells the stream where the viewer is. */
+    private sendStream(radiusChunks: number[]): void {
+        const { position, velocity } = this.controls;
+        const vector = ({ x, y, z }: { x: number; y: number; z: number }) => ({ x, y, z });
+        this.send({
+            kind: 'view',
+            view: {
+                position: vector(position),
+                direction: vector(this.controls.direction()),
+                velocity: vector(velocity),
+                fieldOfView: (FIELD_OF_VIEW_DEGREES * Math.PI) / 180 * Math.max(window.innerWidth / window.innerHeight, 1),
+                radiusChunks,
+                format: this.format,
+            },
+        });
     }
 
     private frame(): void {
@@ -515,7 +533,7 @@ export class Viewer {
         const hasMoved = pose !== this.lastPose;
         this.lastPose = pose;
         if (world !== undefined) {
-            const isNew = world.tiles.update(seconds, position);
+            const isNew = world.tiles.update(Math.min(elapsed / 1000, 1), position);
             const { origin } = world.tiles;
             camera.position.set(position.x - origin.x, position.y, position.z - origin.z);
             world.xray.update(position, origin);

@@ -1,37 +1,50 @@
 // A server that serves the built viewer, and headless Chromium on it.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync } from 'node:fs';
-import { dirname, join } from 'node:path';
-import { fileURLToPath } from 'node:url';
+import { join } from 'node:path';
 import { inflateSync } from 'node:zlib';
 
 import { chromium } from 'playwright-core';
 
-export const root = join(dirname(fileURLToPath(import.meta.url)), '../../..');
+/** tests/e2e/web/run says where the repository is: the tests run from a copy beside their packages. */
+export const root = process.env.TERRANE_ROOT ?? process.cwd();
 export const terrane = process.env.TERRANE_BIN ?? join(root, 'build/release/bin/terrane');
-export const basin = join(root, 'generator/worlds/basin.toml');
-const shots = join(root, 'build/e2e-web');
+export const demo = join(root, 'generator/worlds/canyon.toml');
+const shots = join(root, 'build/e2e-web/screenshots');
 mkdirSync(shots, { recursive: true });
+
+/** A machine that builds something else meanwhile is given this long for anything. */
+const PATIENCE_MS = 90_000;
 
 if (!existsSync(terrane)) {
     throw new Error(`${terrane} is not built; name it in TERRANE_BIN`);
 }
 
-/** Resolves with its HTTP port once it listens. `port` 0 takes a free one. */
-export function startServer({ port = 0, world = basin } = {}) {
+/** Resolves with its HTTP and TCP ports once it listens. `port` 0 takes a free one. The viewer is found without a flag. */
+export function startServer({ port = 0, world = demo, options = ['--store', 'memory'] } = {}) {
     const server = spawn(
         terrane,
-        ['serve', '--world', world, '--store', 'memory', '--tcp', '127.0.0.1:0', '--http', `127.0.0.1:${port}`],
+        ['serve', '--world', world, ...options, '--tcp', '127.0.0.1:0', '--http', `127.0.0.1:${port}`],
         { stdio: ['ignore', 'pipe', 'pipe'] },
     );
+    const end = () => server.kill('SIGKILL');
+    process.once('exit', end);
     return new Promise((resolve, reject) => {
         let log = '';
         const read = (text) => {
             log += text;
+            const tcp = /listening on tcp [0-9.]*:(\d+)/.exec(log);
             const found = /listening on http [0-9.]*:(\d+)/.exec(log);
-            if (found) {
-                const stop = () => new Promise((done) => server.on('exit', done) && server.kill('SIGTERM'));
-                resolve({ port: Number(found[1]), stop });
+            if (tcp && found) {
+                const stop = () =>
+                    new Promise((done) => {
+                        server.on('exit', () => {
+                            process.off('exit', end);
+                            done();
+                        });
+                        server.kill('SIGTERM');
+                    });
+                resolve({ port: Number(found[1]), tcpPort: Number(tcp[1]), stop });
             }
         };
         server.stdout.on('data', read);
@@ -44,6 +57,7 @@ export function startBrowser() {
     return chromium.launch({
         executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
         headless: true,
+        timeout: PATIENCE_MS,
         args: [
             '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
             '--disable-component-update', '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
@@ -52,8 +66,9 @@ export function startBrowser() {
 }
 
 /** A page on the viewer that notes all that goes wrong in `faults`. */
-export async function openViewer(browser, port, { query = '', place = '' } = {}) {
-    const page = await browser.newPage({ viewport: { width: 800, height: 500 } });
+export async function openViewer(browser, port, { query = '', place = '', width = 840, height = 480 } = {}) {
+    const page = await browser.newPage({ viewport: { width, height } });
+    page.setDefaultTimeout(PATIENCE_MS);
     const faults = [];
     page.on('pageerror', (error) => faults.push(`page: ${error.message}`));
     page.on('console', (message) => {
@@ -66,18 +81,32 @@ export async function openViewer(browser, port, { query = '', place = '' } = {})
 }
 
 /** Waits until a condition holds in the page. */
-export function until(page, condition, argument, timeout = 60_000) {
-    return page.waitForFunction(condition, argument, { timeout, polling: 200 });
+export function until(page, condition, argument) {
+    return page.waitForFunction(condition, argument, { timeout: PATIENCE_MS, polling: 100 });
 }
 
-export function isWholeNearView() {
-    const { figures, times } = window.terrane;
-    return times.nearView > 0 && figures !== undefined && figures.nearMissing === 0;
+/** Puts the viewer somewhere and waits until its view is whole, at rest, and drawn. */
+export async function go(page, place) {
+    await page.evaluate((hash) => {
+        location.hash = hash;
+        window.terrane.figures = undefined;
+    }, place);
+    await settle(page);
+}
+
+/** Waits until all that is wanted is there and two pictures have been drawn since. */
+export async function settle(page) {
+    await until(page, () => {
+        const { figures } = window.terrane;
+        return figures?.tilesWanted > 0 && figures.tilesMissing === 0 && !window.terrane.sceneFigures().isFading;
+    });
+    const drawn = await page.evaluate(() => window.terrane.framesDrawn);
+    await until(page, (before) => window.terrane.framesDrawn > before + 1, drawn);
 }
 
 /** Takes a picture for whoever wants to look, and gives its pixels. */
 export async function look(page, name) {
-    const png = await page.screenshot({ path: join(shots, `${name}.png`), timeout: 120_000 });
+    const png = await page.screenshot({ path: join(shots, `${name}.png`), timeout: PATIENCE_MS });
     return readPng(png);
 }
 

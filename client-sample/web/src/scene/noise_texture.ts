@@ -11,40 +11,59 @@ function makeNoise(seed: number): (x: number, y: number, period: number) => numb
         h = Math.imul(h ^ (h >>> 13), 1274126177);
         return ((h ^ (h >>> 16)) >>> 0) / 4294967296;
     };
+    // The page waits for these textures: each gradient is made once, not once a texel.
+    const tables = new Map<number, Float32Array>();
+    const tableOf = (period: number) => {
+        const table = new Float32Array(2 * period * period);
+        for (let i = 0; i < period * period; ++i) {
+            const angle = hash(i % period, Math.floor(i / period)) * Math.PI * 2;
+            table[2 * i] = Math.cos(angle);
+            table[2 * i + 1] = Math.sin(angle);
+        }
+        tables.set(period, table);
+        return table;
+    };
     const fade = (t: number) => t * t * t * (t * (t * 6 - 15) + 10);
     return (x, y, period) => {
+        const table = tables.get(period) ?? tableOf(period);
         const x0 = Math.floor(x);
         const y0 = Math.floor(y);
-        const gradient = (ix: number, iy: number) => {
-            const angle = hash(((ix % period) + period) % period, ((iy % period) + period) % period) * Math.PI * 2;
-            return Math.cos(angle) * (x - ix) + Math.sin(angle) * (y - iy);
-        };
-        const u = fade(x - x0);
-        const v = fade(y - y0);
-        const a = gradient(x0, y0) + u * (gradient(x0 + 1, y0) - gradient(x0, y0));
-        const b = gradient(x0, y0 + 1) + u * (gradient(x0 + 1, y0 + 1) - gradient(x0, y0 + 1));
-        return (a + v * (b - a)) * 1.4;
+        const dx = x - x0;
+        const dy = y - y0;
+        const left = ((x0 % period) + period) % period;
+        const right = left + 1 === period ? 0 : left + 1;
+        const low = (((y0 % period) + period) % period) * period;
+        const high = low + period === period * period ? 0 : low + period;
+        const at = (i: number, byX: number, byY: number) => table[2 * i]! * byX + table[2 * i + 1]! * byY;
+        const u = fade(dx);
+        const a = at(low + left, dx, dy);
+        const b = at(high + left, dx, dy - 1);
+        const lower = a + u * (at(low + right, dx - 1, dy) - a);
+        const upper = b + u * (at(high + right, dx - 1, dy - 1) - b);
+        return (lower + fade(dy) * (upper - lower)) * 1.4;
     };
 }
 
 /** Distance to the edge between the two nearest of scattered points: cracks. */
 function makeCracks(seed: number, cells: number): (x: number, y: number) => number {
-    const random = (x: number, y: number, which: number) => {
-        const wrapped = (((y % cells) + cells) % cells) * cells + (((x % cells) + cells) % cells);
+    const random = (wrapped: number, which: number) => {
         let h = Math.imul(wrapped + 1, 2654435761) ^ Math.imul(seed + which, 2246822519);
         h = Math.imul(h ^ (h >>> 15), 2246822519);
         return ((h ^ (h >>> 13)) >>> 0) / 4294967296;
     };
+    const points = Float32Array.from({ length: 2 * cells * cells }, (_, i) => random(i >> 1, 1 + (i & 1)));
     return (x, y) => {
         let nearest = Infinity;
         let second = Infinity;
         const ix = Math.floor(x);
         const iy = Math.floor(y);
         for (let dy = -1; dy <= 1; ++dy) {
+            const row = ((((iy + dy) % cells) + cells) % cells) * cells;
             for (let dx = -1; dx <= 1; ++dx) {
-                const px = ix + dx + random(ix + dx, iy + dy, 1) - x;
-                const py = iy + dy + random(ix + dx, iy + dy, 2) - y;
-                const distance = Math.hypot(px, py);
+                const cell = row + ((((ix + dx) % cells) + cells) % cells);
+                const px = ix + dx + points[2 * cell]! - x;
+                const py = iy + dy + points[2 * cell + 1]! - y;
+                const distance = px * px + py * py;
                 if (distance < nearest) {
                     second = nearest;
                     nearest = distance;
@@ -53,7 +72,7 @@ function makeCracks(seed: number, cells: number): (x: number, y: number) => numb
                 }
             }
         }
-        return second - nearest;
+        return Math.sqrt(second) - Math.sqrt(nearest);
     };
 }
 

@@ -8,11 +8,12 @@ import { makeSky } from './sky';
 
 const SHADOW_REACH = 190;
 const FAR = 60_000;
+export const FIELD_OF_VIEW_DEGREES = 62;
 
 export class Stage {
     readonly renderer: THREE.WebGLRenderer;
     readonly scene = new THREE.Scene();
-    readonly camera = new THREE.PerspectiveCamera(62, 1, 0.35, FAR);
+    readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW_DEGREES, 1, 0.35, FAR);
     readonly textures: DetailTextures = makeDetailTextures();
     readonly rendererName: string;
     /** Drawn by the processor: filters that hardware has for nothing are dear. */

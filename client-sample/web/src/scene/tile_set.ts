@@ -124,7 +124,7 @@ export class TileSet {
         return meshes;
     }
 
-    figures(): { tiles: number; shown: number; triangles: number; bytes: number } {
+    figures(): { tiles: number; shown: number; triangles: number; bytes: number; isFading: boolean } {
         let shown = 0;
         let triangles = 0;
         let bytes = 0;
@@ -133,7 +133,7 @@ export class TileSet {
             triangles += tile.isShown ? tile.triangles : 0;
             bytes += tile.bytes;
         }
-        return { tiles: this.tiles.size, shown, triangles, bytes };
+        return { tiles: this.tiles.size, shown, triangles, bytes, isFading: this.isFading || this.isDirty };
     }
 
     /** Whether the ground under a point is drawn, at any level. */
@@ -206,6 +206,7 @@ export class TileSet {
     /** Walks the wanted quadtree and marks what shall be shown. */
     private choose(): void {
         const chosen = new Set<string>();
+        const covered = this.coveredNow();
         for (const root of this.roots) {
             const shown: string[] = [];
             this.cover(root, shown);
@@ -219,8 +220,42 @@ export class TileSet {
             if (isShown !== tile.isShown) {
                 tile.isShown = isShown;
                 this.isFading = true;
+                if (isShown && tile.fade === 0 && !covered(tile.square)) {
+                    // Over nothing it appears at once: a fade would show holes.
+                    tile.fade = 1;
+                    if (tile.mesh !== null) {
+                        tile.mesh.material = this.materials.at(1, false);
+                    }
+                }
             }
         }
+    }
+
+    /** Whether anything of a square is on the screen, as coarser or finer tiles. */
+    private coveredNow(): (square: Square) => boolean {
+        const shown = new Set<string>();
+        const above = new Set<string>();
+        const up = ({ lod, x, z }: Square) => ({ lod: lod + 1, x: Math.floor(x / 2), z: Math.floor(z / 2) });
+        const top = this.roots[0]?.lod ?? 0;
+        for (const { name, square, fade } of this.tiles.values()) {
+            if (fade > 0) {
+                shown.add(name);
+                for (let parent = up(square); parent.lod <= top; parent = up(parent)) {
+                    above.add(squareName(parent));
+                }
+            }
+        }
+        return (square) => {
+            if (above.has(squareName(square))) {
+                return true;
+            }
+            for (let parent = up(square); parent.lod <= top; parent = up(parent)) {
+                if (shown.has(squareName(parent))) {
+                    return true;
+                }
+            }
+            return false;
+        };
     }
 
     /** Appends tiles that show as much of a square as is there; true if that is all of it. */
