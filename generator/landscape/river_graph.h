@@ -17,6 +17,7 @@
 // Everything that looks a place up first moves it by a noise, which makes the rivers wind.
 #pragma once
 
+#include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/noise.h"
 #include "generator/world/world_definition.h"
 
@@ -26,7 +27,6 @@
 
 namespace terrane {
 
-inline constexpr std::int32_t kReachSegments = 4;
 inline constexpr std::int32_t kUpstreamSteps = 3;
 /// The nodes that can matter to a place: so many cells around its own.
 inline constexpr std::int64_t kRiverReachCells = 3;
