@@ -15,13 +15,6 @@ constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its r
 constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
 constexpr float kFar = 1e9F;
 
-/// A column and a reach.
-struct Near {
-    float distance = 0;
-    float half_width = 0;
-    float level = 0;
-};
-
 float half_width_of(const ChannelConstants& constants, const Reach& reach, float along) {
     const float width = 0.15F + constants.rivers * (reach.measure + reach.measure_change * along);
     return reach.is_sink ? kLakeWidths * width + 2.0F : width;
@@ -81,10 +74,10 @@ Lookers lookers(float low, float high, float wander_min, float wander_max, std::
             .end = static_cast<std::int32_t>(std::clamp(end, 0.0F, most))};
 }
 
-/// Calls `use(i, near)` for each column within `out` of each wet reach, reach by reach.
-template <typename Use>
-void for_each_near(const ChannelConstants& constants, const ReliefRasters& relief,
-                   const RiverGraph& rivers, const RectangleShape& shape, Use use) {
+/// Each column within `out` of each wet reach, reach by reach.
+void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
+               const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape) {
+    found.clear();
     const Wander wander = wander_of(relief, shape);
     for (const Reach& reach : rivers.reaches()) {
         if (!is_wet(constants, reach)) {
@@ -116,15 +109,16 @@ void for_each_near(const ChannelConstants& constants, const ReliefRasters& relie
                 if (half_width < kDryWidth || nearest.square >= reach_out * reach_out) {
                     continue;
                 }
-                use(i, Near{.distance = std::sqrt(nearest.square),
-                            .half_width = half_width,
-                            .level = reach.level + reach.level_change * nearest.along});
+                found.push_back({.column = i,
+                                 .distance = std::sqrt(nearest.square),
+                                 .half_width = half_width,
+                                 .level = reach.level + reach.level_change * nearest.along});
             }
         }
     }
 }
 
-float channel_height(const Near& near, float ground) {
+float channel_height(const NearReach& near, float ground) {
     const float d = near.distance;
     const float w = near.half_width;
     if (d < w) {
@@ -152,7 +146,9 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
     if (relief.has_rivers && constants.rivers > 0) {
-        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+        find_near(out.near, constants, relief, rivers, shape);
+        for (const NearReach& near : out.near) {
+            const std::size_t i = near.column;
             const float nearness = near.distance / near.half_width;
             out.nearness[i] = std::min(out.nearness[i], nearness);
             out.near_count[i] += nearness < kBank ? 1.0F : 0.0F;
@@ -164,15 +160,16 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
                     (out.weight[i] > 0 ? out.water[i] : 0.0F) + weight * (near.level - kFreeboard);
                 out.weight[i] += weight;
             }
-        });
-        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+        }
+        for (const NearReach& near : out.near) {
+            const std::size_t i = near.column;
             const float height = channel_height(near, ground[i]);
             const bool is_bank =
                 near.distance < kBank * near.half_width && out.near_count[i] <= 1.0F;
             if (height < ground[i] || is_bank) {
                 ground[i] = height;
             }
-        });
+        }
     }
     for (std::size_t i = 0; i < size; ++i) {
         const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;

@@ -25,34 +25,49 @@ CellPlace cell_place(std::int64_t coordinate, std::uint64_t frequency) {
 }
 
 /// The points of the 3 x 3 cells around each column's, for rows whose cell is `cell_z`.
+/// One random point of a cell, from its hash.
+struct CellPoint {
+    float x = 0;
+    float z = 0;
+};
+
+CellPoint point_of(std::uint64_t hash, std::int64_t dx, std::int64_t dz) {
+    const float x = static_cast<float>(hash >> 40U) * 0x1p-24F;
+    const float z = static_cast<float>(hash >> 8U & 0xffffffU) * 0x1p-24F;
+    return {.x = static_cast<float>(dx) + (0.25F + 0.5F * x),
+            .z = static_cast<float>(dz) + (0.25F + 0.5F * z)};
+}
+
 void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers,
                  std::int64_t cell_z) {
     const std::vector<std::int64_t>& cells = buffers.cells;
-    std::size_t column = 0;
-    while (column < cells.size()) {
-        const std::int64_t cell = cells[column];
-        std::size_t end = column + 1;
-        while (end < cells.size() && cells[end] == cell) {
-            ++end;
-        }
-        std::size_t point = 0;
-        for (std::int64_t dz = -1; dz <= 1; ++dz) {
-            for (std::int64_t dx = -1; dx <= 1; ++dx, ++point) {
-                const std::uint64_t hash =
-                    key(buffers.hashes[column][static_cast<std::size_t>(dx + 1)], cell_z + dz);
-                const float x = static_cast<float>(hash >> 40U) * 0x1p-24F;
-                const float z = static_cast<float>(hash >> 8U & 0xffffffU) * 0x1p-24F;
-                float* const px = points + point * plane;
-                float* const pz = px + kErosionPoints * plane;
-                std::fill(px + column, px + end, static_cast<float>(dx) + (0.25F + 0.5F * x));
-                std::fill(pz + column, pz + end, static_cast<float>(dz) + (0.25F + 0.5F * z));
+    const std::size_t width = cells.size();
+    std::size_t point = 0;
+    for (std::int64_t dz = -1; dz <= 1; ++dz) {
+        for (std::int64_t dx = -1; dx <= 1; ++dx, ++point) {
+            float* const px = points + point * plane;
+            float* const pz = px + kErosionPoints * plane;
+            const auto hash_at = [&](std::size_t column) {
+                return key(buffers.hashes[column][static_cast<std::size_t>(dx + 1)], cell_z + dz);
+            };
+            for (std::size_t column = 0; buffers.is_sparse && column < width; ++column) {
+                const CellPoint found = point_of(hash_at(column), dx, dz);
+                px[column] = found.x;
+                pz[column] = found.z;
+            }
+            for (std::size_t column = 0; !buffers.is_sparse && column < width;) {
+                const CellPoint found = point_of(hash_at(column), dx, dz);
+                const std::int64_t cell = cells[column];
+                for (; column < width && cells[column] == cell; ++column) {
+                    px[column] = found.x;
+                    pz[column] = found.z;
+                }
             }
         }
-        column = end;
     }
     for (std::size_t one = 0; one < 2 * kErosionPoints; ++one) {
         float* const row = points + one * plane;
-        std::fill(row + column, row + plane, row[column - 1]);
+        std::fill(row + width, row + plane, row[width - 1]);
     }
 }
 
@@ -84,6 +99,7 @@ void run_octave(float* sum, float* mask, float* fade, ReliefRasters& relief,
     float* const points = fraction_x + plane;
     buffers.cells.resize(static_cast<std::size_t>(shape.width));
     buffers.hashes.resize(static_cast<std::size_t>(shape.width));
+    std::int32_t runs = 0;  // of columns in one cell
     for (std::int32_t i = 0; i < shape.width; ++i) {
         const CellPlace place = cell_place(shape.x0 + i * shape.step, octave.frequency);
         const auto column = static_cast<std::size_t>(i);
@@ -91,12 +107,14 @@ void run_octave(float* sum, float* mask, float* fade, ReliefRasters& relief,
         if (i > 0 && place.cell == buffers.cells[column - 1]) {
             buffers.hashes[column] = buffers.hashes[column - 1];
         } else {
+            ++runs;
             buffers.hashes[column] = {key(octave.seed, place.cell - 1),
                                       key(octave.seed, place.cell),
                                       key(octave.seed, place.cell + 1)};
         }
         fraction_x[i] = place.fraction;
     }
+    buffers.is_sparse = 2 * runs > shape.width;
     std::fill(fraction_x + shape.width, fraction_x + plane, fraction_x[shape.width - 1]);
     std::int64_t filled = 0;
     for (std::int32_t z = 0; z < shape.length; ++z) {

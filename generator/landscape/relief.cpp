@@ -182,33 +182,27 @@ void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, c
     }
     const float reach = 1.1F * constants.valley;
     const float slack = reach + 1.0F;  // far above rounding errors: what is left out weighs 0
-    const auto low_x = static_cast<float>(x_min - origin_x) - slack;
-    const auto high_x = static_cast<float>(x_max - origin_x) + slack;
-    const auto low_z = static_cast<float>(z_min - origin_z) - slack;
-    const auto high_z = static_cast<float>(z_max - origin_z) + slack;
-    const std::int64_t first_i = rivers.cell_of(x_min, 1) - kRiverReachCells;
-    const std::int64_t last_i = rivers.cell_of(x_max, 0) + kRiverReachCells;
-    const std::int64_t last_j = rivers.row_of(z_max) + kRiverReachCells;
+    const Reach& first = rivers_.reaches().front();
     near_.clear();
-    for (std::int64_t j = rivers.row_of(z_min) - kRiverReachCells; j <= last_j; ++j) {
-        for (std::int64_t i = first_i; i <= last_i; ++i) {
-            const Reach& one = rivers_.reach(i, j);
-            const auto node_x = static_cast<float>(one.x - origin_x);
-            const auto node_z = static_cast<float>(one.z - origin_z);
-            if (node_x + one.x_min > high_x || node_x + one.x_max < low_x ||
-                node_z + one.z_min > high_z || node_z + one.z_max < low_z) {
-                continue;
-            }
-            ReachShape& shape = near_.emplace_back();
-            shape.x = node_x;
-            shape.z = node_z;
-            std::copy(one.px.begin(), one.px.end(), shape.px);
-            std::copy(one.pz.begin(), one.pz.end(), shape.pz);
-            std::copy(one.inverse_square.begin(), one.inverse_square.end(), shape.inverse_square);
-            shape.level = one.level;
-            shape.level_change = one.level_change;
-        }
-    }
+    rivers_.for_each_meeting({.first_i = rivers.cell_of(x_min, 1) - kRiverReachCells,
+                              .last_i = rivers.cell_of(x_max, 0) + kRiverReachCells,
+                              .first_j = rivers.row_of(z_min) - kRiverReachCells,
+                              .last_j = rivers.row_of(z_max) + kRiverReachCells},
+                             {.x_min = static_cast<float>(x_min - first.x) - slack,
+                              .x_max = static_cast<float>(x_max - first.x) + slack,
+                              .z_min = static_cast<float>(z_min - first.z) - slack,
+                              .z_max = static_cast<float>(z_max - first.z) + slack},
+                             [&](const Reach& one) {
+                                 ReachShape& shape = near_.emplace_back();
+                                 shape.x = static_cast<float>(one.x - origin_x);
+                                 shape.z = static_cast<float>(one.z - origin_z);
+                                 std::copy(one.px.begin(), one.px.end(), shape.px);
+                                 std::copy(one.pz.begin(), one.pz.end(), shape.pz);
+                                 std::copy(one.inverse_square.begin(), one.inverse_square.end(),
+                                           shape.inverse_square);
+                                 shape.level = one.level;
+                                 shape.level_change = one.level_change;
+                             });
     kernels.valleys(places, near_.data(), static_cast<std::int32_t>(near_.size()),
                     {.inverse_reach_square = 1.0F / (reach * reach),
                      .e2 = 0.0025F * constants.valley * constants.valley,
