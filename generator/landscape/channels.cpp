@@ -15,13 +15,6 @@ constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its r
 constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
 constexpr float kFar = 1e9F;
 
-/// A column and a reach.
-struct Near {
-    float distance = 0;
-    float half_width = 0;
-    float level = 0;
-};
-
 float half_width_of(const ChannelConstants& constants, const Reach& reach, float along) {
     const float width = 0.15F + constants.rivers * (reach.measure + reach.measure_change * along);
     return reach.is_sink ? kLakeWidths * width + 2.0F : width;
@@ -39,41 +32,53 @@ float out_of(float half_width) {
     return 5.0F * half_width + 2.0F;
 }
 
-/// Where the columns of a region look for their river, from the smallest to the greatest.
-struct Looked {
+/// How far columns of a region look aside for their river, least and most.
+struct Wander {
     float x_min = kFar;
     float x_max = -kFar;
     float z_min = kFar;
     float z_max = -kFar;
 };
 
-Looked looked_at(const ReliefRasters& relief, const RectangleShape& shape) {
-    Looked looked;
+Wander wander_of(const ReliefRasters& relief, const RectangleShape& shape) {
+    Wander wander;
     for (std::int32_t row = 0; row < shape.length; ++row) {
         for (std::int32_t column = 0; column < shape.width; ++column) {
             const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-            const float x = static_cast<float>(column * shape.step) + relief.wander_x[i];
-            const float z = static_cast<float>(row * shape.step) + relief.wander_z[i];
-            looked = {.x_min = std::min(looked.x_min, x),
-                      .x_max = std::max(looked.x_max, x),
-                      .z_min = std::min(looked.z_min, z),
-                      .z_max = std::max(looked.z_max, z)};
+            const float x = relief.wander_x[i];
+            const float z = relief.wander_z[i];
+            wander = {.x_min = std::min(wander.x_min, x),
+                      .x_max = std::max(wander.x_max, x),
+                      .z_min = std::min(wander.z_min, z),
+                      .z_max = std::max(wander.z_max, z)};
         }
     }
-    return looked;
+    return wander;
 }
 
-bool meets(const Looked& looked, const Reach& reach, float x0, float z0, float out) {
-    const float most = out + 1.0F;  // a column of slack for float rounding
-    return looked.x_max - x0 >= reach.x_min - most && looked.x_min - x0 <= reach.x_max + most &&
-           looked.z_max - z0 >= reach.z_min - most && looked.z_min - z0 <= reach.z_max + most;
+/// The columns, or rows, from `first` to before `end` that may look at low..high, in columns from
+/// the region's first one.
+struct Lookers {
+    std::int32_t first = 0;
+    std::int32_t end = 0;
+};
+
+Lookers lookers(float low, float high, float wander_min, float wander_max, std::int64_t step,
+                std::int32_t count) {
+    const float inverse = 1.0F / static_cast<float>(step);
+    const auto most = static_cast<float>(count);
+    // A column of slack for float rounding on each side.
+    const float first = std::floor((low - wander_max - 1.0F) * inverse);
+    const float end = std::floor((high - wander_min + 1.0F) * inverse) + 2.0F;
+    return {.first = static_cast<std::int32_t>(std::clamp(first, 0.0F, most)),
+            .end = static_cast<std::int32_t>(std::clamp(end, 0.0F, most))};
 }
 
-/// Calls `use(i, near)` for each column within `out` of each wet reach, reach by reach.
-template <typename Use>
-void for_each_near(const ChannelConstants& constants, const ReliefRasters& relief,
-                   const RiverGraph& rivers, const RectangleShape& shape, Use use) {
-    const Looked looked = looked_at(relief, shape);
+/// Each column within `out` of each wet reach, reach by reach.
+void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
+               const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape) {
+    found.clear();
+    const Wander wander = wander_of(relief, shape);
     for (const Reach& reach : rivers.reaches()) {
         if (!is_wet(constants, reach)) {
             continue;
@@ -82,11 +87,12 @@ void for_each_near(const ChannelConstants& constants, const ReliefRasters& relie
             std::max(half_width_of(constants, reach, 0), half_width_of(constants, reach, 1)));
         const auto x0 = static_cast<float>(reach.x - shape.x0);
         const auto z0 = static_cast<float>(reach.z - shape.z0);
-        if (!meets(looked, reach, x0, z0, out)) {
-            continue;
-        }
-        for (std::int32_t row = 0; row < shape.length; ++row) {
-            for (std::int32_t column = 0; column < shape.width; ++column) {
+        const Lookers columns = lookers(x0 + reach.x_min - out, x0 + reach.x_max + out,
+                                        wander.x_min, wander.x_max, shape.step, shape.width);
+        const Lookers rows = lookers(z0 + reach.z_min - out, z0 + reach.z_max + out, wander.z_min,
+                                     wander.z_max, shape.step, shape.length);
+        for (std::int32_t row = rows.first; row < rows.end; ++row) {
+            for (std::int32_t column = columns.first; column < columns.end; ++column) {
                 const auto i = static_cast<std::size_t>(row * shape.stride() + column);
                 // From the reach, not from the region: the same bits for every region.
                 const float x = static_cast<float>(shape.x0 + column * shape.step - reach.x) +
@@ -103,15 +109,16 @@ void for_each_near(const ChannelConstants& constants, const ReliefRasters& relie
                 if (half_width < kDryWidth || nearest.square >= reach_out * reach_out) {
                     continue;
                 }
-                use(i, Near{.distance = std::sqrt(nearest.square),
-                            .half_width = half_width,
-                            .level = reach.level + reach.level_change * nearest.along});
+                found.push_back({.column = i,
+                                 .distance = std::sqrt(nearest.square),
+                                 .half_width = half_width,
+                                 .level = reach.level + reach.level_change * nearest.along});
             }
         }
     }
 }
 
-float channel_height(const Near& near, float ground) {
+float channel_height(const NearReach& near, float ground) {
     const float d = near.distance;
     const float w = near.half_width;
     if (d < w) {
@@ -139,7 +146,9 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
     if (relief.has_rivers && constants.rivers > 0) {
-        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+        find_near(out.near, constants, relief, rivers, shape);
+        for (const NearReach& near : out.near) {
+            const std::size_t i = near.column;
             const float nearness = near.distance / near.half_width;
             out.nearness[i] = std::min(out.nearness[i], nearness);
             out.near_count[i] += nearness < kBank ? 1.0F : 0.0F;
@@ -151,15 +160,16 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
                     (out.weight[i] > 0 ? out.water[i] : 0.0F) + weight * (near.level - kFreeboard);
                 out.weight[i] += weight;
             }
-        });
-        for_each_near(constants, relief, rivers, shape, [&](std::size_t i, const Near& near) {
+        }
+        for (const NearReach& near : out.near) {
+            const std::size_t i = near.column;
             const float height = channel_height(near, ground[i]);
             const bool is_bank =
                 near.distance < kBank * near.half_width && out.near_count[i] <= 1.0F;
             if (height < ground[i] || is_bank) {
                 ground[i] = height;
             }
-        });
+        }
     }
     for (std::size_t i = 0; i < size; ++i) {
         const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;

@@ -14,6 +14,7 @@
 #include "generator/terrain/noise.h"
 #include "generator/world/world_definition.h"
 
+#include <cstddef>
 #include <vector>
 
 namespace terrane {
@@ -28,12 +29,21 @@ struct ChannelConstants {
     explicit ChannelConstants(const WorldDefinition& definition);
 };
 
+/// A column and a reach that it is near to.
+struct NearReach {
+    std::size_t column = 0;
+    float distance = 0;
+    float half_width = 0;
+    float level = 0;
+};
+
 /// Per column of a shape.
 struct ChannelRasters {
     std::vector<float> water;       ///< level, or kNoWater
     std::vector<float> nearness;    ///< distance to the nearest channel's middle in its half widths
     std::vector<float> near_count;  ///< channels nearer than 1.5 of their half widths
     std::vector<float> weight;      ///< of the levels that `water` is made of
+    std::vector<NearReach> near;    ///< scratch: reach by reach
 };
 
 /// Cuts the channels into `ground` and says where water stands; the sea is part of it.

@@ -75,24 +75,26 @@ void ColumnRuns::cut(std::int32_t top) {
 }
 
 void ColumnRuns::write(Limits& out, std::uint16_t void_id) const {
+    const std::size_t first = out.size();
+    out.resize(first + 3 * runs_.size() + 1);
+    Limit* to = out.data() + first;
     LimitTail shown = void_id;
     for (const Run& run : runs_) {
         const bool blends = run.middle > run.bottom;
         const LimitTail start = blends ? run.from : run.tail;
         if (run.bottom > 0 && start == shown) {
-            if (!blends) {  // goes on with what is there
-                out.pop_back();
-            }
+            to -= blends ? 0 : 1;  // goes on with what is there
         } else {
-            out.push_back(limit_of(run.bottom, start));
+            *to++ = limit_of(run.bottom, start);
         }
         if (blends && run.middle < run.top) {
-            out.push_back(limit_of(run.middle, run.tail));
+            *to++ = limit_of(run.middle, run.tail);
         }
-        out.push_back(limit_of(run.top, run.tail));
+        *to++ = limit_of(run.top, run.tail);
         shown = run.tail;
     }
-    out.push_back({.y256 = top(), .palette_id = void_id, .flow = {}});
+    *to++ = {.y256 = top(), .palette_id = void_id, .flow = {}};
+    out.resize(static_cast<std::size_t>(to - out.data()));
 }
 
 }  // namespace terrane

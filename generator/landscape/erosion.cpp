@@ -25,28 +25,69 @@ CellPlace cell_place(std::int64_t coordinate, std::uint64_t frequency) {
 }
 
 /// The points of the 3 x 3 cells around each column's, for rows whose cell is `cell_z`.
-void fill_points(float* points, std::size_t plane, const GullyOctave& octave,
-                 const std::vector<std::int64_t>& cells, std::int64_t cell_z) {
-    std::size_t column = 0;
-    while (column < cells.size()) {
-        const std::int64_t cell = cells[column];
-        std::size_t end = column + 1;
-        while (end < cells.size() && cells[end] == cell) {
-            ++end;
-        }
-        std::size_t point = 0;
-        for (std::int64_t dz = -1; dz <= 1; ++dz) {
-            for (std::int64_t dx = -1; dx <= 1; ++dx, ++point) {
-                const std::uint64_t hash = key(octave.seed, cell + dx, cell_z + dz);
-                const float x = static_cast<float>(hash >> 40U) * 0x1p-24F;
-                const float z = static_cast<float>(hash >> 8U & 0xffffffU) * 0x1p-24F;
-                float* const px = points + point * plane;
-                float* const pz = px + kErosionPoints * plane;
-                std::fill(px + column, px + end, static_cast<float>(dx) + (0.25F + 0.5F * x));
-                std::fill(pz + column, pz + end, static_cast<float>(dz) + (0.25F + 0.5F * z));
+/// One random point of a cell, from its hash.
+struct CellPoint {
+    float x = 0;
+    float z = 0;
+};
+
+CellPoint point_of(std::uint64_t hash, std::int64_t dx, std::int64_t dz) {
+    const float x = static_cast<float>(hash >> 40U) * 0x1p-24F;
+    const float z = static_cast<float>(hash >> 8U & 0xffffffU) * 0x1p-24F;
+    return {.x = static_cast<float>(dx) + (0.25F + 0.5F * x),
+            .z = static_cast<float>(dz) + (0.25F + 0.5F * z)};
+}
+
+void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers,
+                 std::int64_t cell_z) {
+    const std::vector<std::int64_t>& cells = buffers.cells;
+    const std::size_t width = cells.size();
+    std::size_t point = 0;
+    for (std::int64_t dz = -1; dz <= 1; ++dz) {
+        for (std::int64_t dx = -1; dx <= 1; ++dx, ++point) {
+            float* const px = points + point * plane;
+            float* const pz = px + kErosionPoints * plane;
+            const auto hash_at = [&](std::size_t column) {
+                return key(buffers.hashes[column][static_cast<std::size_t>(dx + 1)], cell_z + dz);
+            };
+            for (std::size_t column = 0; buffers.is_sparse && column < width; ++column) {
+                const CellPoint found = point_of(hash_at(column), dx, dz);
+                px[column] = found.x;
+                pz[column] = found.z;
+            }
+            for (std::size_t column = 0; !buffers.is_sparse && column < width;) {
+                const CellPoint found = point_of(hash_at(column), dx, dz);
+                const std::int64_t cell = cells[column];
+                for (; column < width && cells[column] == cell; ++column) {
+                    px[column] = found.x;
+                    pz[column] = found.z;
+                }
             }
         }
-        column = end;
+    }
+    for (std::size_t one = 0; one < 2 * kErosionPoints; ++one) {
+        float* const row = points + one * plane;
+        std::fill(row + width, row + plane, row[width - 1]);
+    }
+}
+
+/// How near the points come to each block of columns; the padding repeats the last column.
+void bound_points(std::vector<ErosionBound>& bounds, const float* points, const float* fraction_x,
+                  std::size_t plane) {
+    bounds.clear();
+    for (std::size_t first = 0; first < plane; first += kVectorPad) {
+        for (std::size_t point = 0; point < kErosionPoints; ++point) {
+            const float* const px = points + point * plane + first;
+            const float* const pz = px + kErosionPoints * plane;
+            ErosionBound bound{.square_x = 1e9F, .z_min = pz[0], .z_max = pz[0]};
+            for (std::size_t i = 0; i < kVectorPad; ++i) {
+                const float x = fraction_x[first + i] - px[i];
+                bound.square_x = std::min(bound.square_x, x * x);
+                bound.z_min = std::min(bound.z_min, pz[i]);
+                bound.z_max = std::max(bound.z_max, pz[i]);
+            }
+            bounds.push_back(bound);
+        }
     }
 }
 
@@ -57,16 +98,30 @@ void run_octave(float* sum, float* mask, float* fade, ReliefRasters& relief,
     float* const fraction_x = buffers.points.data();
     float* const points = fraction_x + plane;
     buffers.cells.resize(static_cast<std::size_t>(shape.width));
+    buffers.hashes.resize(static_cast<std::size_t>(shape.width));
+    std::int32_t runs = 0;  // of columns in one cell
     for (std::int32_t i = 0; i < shape.width; ++i) {
         const CellPlace place = cell_place(shape.x0 + i * shape.step, octave.frequency);
-        buffers.cells[static_cast<std::size_t>(i)] = place.cell;
+        const auto column = static_cast<std::size_t>(i);
+        buffers.cells[column] = place.cell;
+        if (i > 0 && place.cell == buffers.cells[column - 1]) {
+            buffers.hashes[column] = buffers.hashes[column - 1];
+        } else {
+            ++runs;
+            buffers.hashes[column] = {key(octave.seed, place.cell - 1),
+                                      key(octave.seed, place.cell),
+                                      key(octave.seed, place.cell + 1)};
+        }
         fraction_x[i] = place.fraction;
     }
+    buffers.is_sparse = 2 * runs > shape.width;
+    std::fill(fraction_x + shape.width, fraction_x + plane, fraction_x[shape.width - 1]);
     std::int64_t filled = 0;
     for (std::int32_t z = 0; z < shape.length; ++z) {
         const CellPlace place = cell_place(shape.z0 + z * shape.step, octave.frequency);
         if (z == 0 || place.cell != filled) {
-            fill_points(points, plane, octave, buffers.cells, place.cell);
+            fill_points(points, plane, buffers, place.cell);
+            bound_points(buffers.bounds, points, fraction_x, plane);
             filled = place.cell;
         }
         const auto first = static_cast<std::ptrdiff_t>(z) * shape.stride();
@@ -78,6 +133,7 @@ void run_octave(float* sum, float* mask, float* fade, ReliefRasters& relief,
                        .fraction_x = fraction_x,
                        .points = points,
                        .plane = static_cast<std::int64_t>(plane),
+                       .bounds = buffers.bounds.data(),
                        .fraction_z = place.fraction,
                        .amplitude = octave.amplitude,
                        .steepening = octave.steepening,

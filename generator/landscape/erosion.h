@@ -47,7 +47,10 @@ struct ErosionConstants {
 struct ErosionBuffers {
     std::vector<float> floats;
     std::vector<float> points;
+    std::vector<ErosionBound> bounds;
     std::vector<std::int64_t> cells;
+    std::vector<std::array<std::uint64_t, 3>> hashes;  ///< of the cells before, at and after
+    bool is_sparse = false;                            ///< most columns have a cell of their own
 };
 
 /// coarse[i], fine[i]: what the filter adds to column i, in voxels, before it is scaled by how

@@ -5,6 +5,7 @@
 #include "protocol/base/coords.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrane {
@@ -144,10 +145,21 @@ void FractureField::build(const FractureConstants& constants, const RectangleSha
         const auto x0 = static_cast<float>(shape.x0 - fracture.x);
         const auto z0 = static_cast<float>(shape.z0 - fracture.z);
         const auto step = static_cast<float>(shape.step);
-        for (std::int32_t row = 0; row < shape.length; ++row) {
+        // The box around its ellipse, tilted as it is; half of what is beyond it is slack.
+        const float most = fracture.length + fracture.reach + 2 * kWarp;
+        const auto within = [&](float start, std::int32_t count) {
+            const auto all = static_cast<float>(count);
+            const float from = std::floor((-most - start) / step);
+            const float to = std::floor((most - start) / step) + 2.0F;
+            return std::array{static_cast<std::int32_t>(std::clamp(from, 0.0F, all)),
+                              static_cast<std::int32_t>(std::clamp(to, 0.0F, all))};
+        };
+        const auto [first_column, end_column] = within(x0, shape.width);
+        const auto [first_row, end_row] = within(z0, shape.length);
+        for (std::int32_t row = first_row; row < end_row; ++row) {
             const float z = z0 + static_cast<float>(row) * step;
             const std::size_t first = static_cast<std::size_t>(row * shape.stride());
-            for (std::int32_t column = 0; column < shape.width; ++column) {
+            for (std::int32_t column = first_column; column < end_column; ++column) {
                 const float x = x0 + static_cast<float>(column) * step;
                 const std::size_t i = first + static_cast<std::size_t>(column);
                 const float l = (x * fracture.along_x + z * fracture.along_z) / fracture.length;

@@ -5,6 +5,7 @@
 #include "generator/terrain/random.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrane {
@@ -183,7 +184,48 @@ void Landscape::raise_banks(const Region& region) {
     }
 }
 
-void Landscape::write(const ColumnWriterOutput& out, const Region& region,
+/// Flow of the layers that show in some column: what the relief has cut away needs none.
+void Landscape::build_flows(Region& region, const TerrainConstants& constants,
+                            const ColumnRectangle& rectangle, const RowKernels& kernels) {
+    constexpr float kSlack = 0.1F;  // voxels; far above rounding errors
+    const RectangleShape& shape = region.shape;
+    const auto margin = static_cast<std::int32_t>((shape.x0 - field_.x0) / shape.step);
+    const std::size_t layers = constants.rules.size();
+    std::array<bool, kLayersMax> shows{};
+    shows[0] = true;
+    shown_.assign(region.plane_size(), 0);
+    for (std::int32_t z = 2; z < rectangle.length + 2; ++z) {
+        for (std::int32_t x = 2; x < rectangle.width + 2; ++x) {
+            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
+            const auto at = static_cast<std::size_t>((z + margin) * field_.stride() + x + margin);
+            // The most that any block of the column was lowered by.
+            float moved = folds_[at];
+            for (const PlaneInColumn& plane : fractures_.planes(at)) {
+                moved -= plane.half_throw;
+            }
+            shown_[i] = static_cast<std::int32_t>(
+                std::ceil((std::max(banks_[i], 2.0F) - moved + kSlack) * kUnitsPerVoxel));
+            if (const Overhang* const overhang = overhangs_.at(i); overhang != nullptr) {
+                shows[static_cast<std::size_t>(overhang->layer)] = true;
+            }
+        }
+    }
+    for (std::size_t k = 0; k < layers; ++k) {
+        if (!shows[k]) {
+            const std::int32_t* const bottom = region.y256.data() + (k - 1) * region.plane_size();
+            std::int32_t found = 0;
+            for (std::size_t i = 0; i < shown_.size(); ++i) {
+                found |= static_cast<std::int32_t>(bottom[i] < shown_[i]);
+            }
+            shows[k] = found != 0;
+        }
+        if (shows[k]) {
+            build_flow(region, constants, k, kernels);
+        }
+    }
+}
+
+void Landscape::write(const ColumnWriterOutput& out, Region& region,
                       const TerrainConstants& constants, const ColumnRectangle& rectangle,
                       std::int32_t apron, const RowKernels& kernels) {
     const RectangleShape& shape = region.shape;
@@ -224,6 +266,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
     cut_channels(ground_.data(), channels_, constants_.channels, relief_, relief_builder_.rivers(),
                  shape);
     raise_banks(region);
+    build_flows(region, constants, rectangle, kernels);
     soil_.resize(shape.padded_size());
     noise_rectangle(soil_.data(), constants_.soil_noise, shape, kernels, noise_);
 
@@ -259,7 +302,9 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
             const std::size_t first = grid.limits.size();
             runs_.write(grid.limits, world_->void_id());
             grid.offsets.push_back(static_cast<std::uint32_t>(grid.limits.size()));
-            for (std::size_t i = first; !out.element_ids.empty() && i < grid.limits.size(); ++i) {
+            // Only columns that lenses meet can show one.
+            const auto at = static_cast<std::size_t>((z + 2) * shape.stride() + x + 2);
+            for (std::size_t i = first; region.gap_mask[at] != 0 && i < grid.limits.size(); ++i) {
                 const std::size_t id = grid.limits[i].palette_id;
                 if (id >= world_->base_palette.size()) {
                     out.element_ids[id - world_->base_palette.size()] = 0;

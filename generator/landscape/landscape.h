@@ -57,16 +57,17 @@ class Landscape {
     static ColumnRectangle region_for(const ColumnRectangle& rectangle);
 
     /// Overwrites `out` with the rectangle's columns and `apron` more on each side (0 or 1),
-    /// without flow there. `region` is built for region_for(rectangle).
-    void write(const ColumnWriterOutput& out, const Region& region,
-               const TerrainConstants& constants, const ColumnRectangle& rectangle,
-               std::int32_t apron, const RowKernels& kernels);
+    /// without flow there. `region` is built for region_for(rectangle); its flow is filled in.
+    void write(const ColumnWriterOutput& out, Region& region, const TerrainConstants& constants,
+               const ColumnRectangle& rectangle, std::int32_t apron, const RowKernels& kernels);
 
   private:
     void build_fields(const ColumnRectangle& rectangle, const Region& region,
                       const RowKernels& kernels);
     void build_ground(const Region& region);
     void raise_banks(const Region& region);
+    void build_flows(Region& region, const TerrainConstants& constants,
+                     const ColumnRectangle& rectangle, const RowKernels& kernels);
 
     const World* world_;
     LandscapeConstants constants_;
@@ -88,8 +89,9 @@ class Landscape {
     std::vector<float> over_;   ///< of the region's shape from here on
     std::vector<float> rest_;
     std::vector<float> ground_;
-    std::vector<float> banks_;  ///< the ground with its banks
-    std::vector<float> soil_;   ///< noise
+    std::vector<float> banks_;         ///< the ground with its banks
+    std::vector<float> soil_;          ///< noise
+    std::vector<std::int32_t> shown_;  ///< height in the stack from which on nothing shows
     ColumnRuns runs_;
 };
 

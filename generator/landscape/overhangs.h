@@ -22,8 +22,9 @@
 namespace terrane {
 
 struct OverhangConstants {
-    std::int32_t reach = 0;           ///< columns; 0: none
-    std::vector<std::size_t> ledges;  ///< layers that can lean out, bottom first
+    std::int32_t reach = 0;  ///< columns; 0: none
+    /// Layers that can lean out, bottom first: at most every second one, so 32.
+    std::vector<std::size_t> ledges;
     Noise noise;
 
     OverhangConstants(const WorldDefinition& definition, const ResistanceConstants& resistance);
@@ -57,11 +58,17 @@ class OverhangField {
     }
 
   private:
+    void find_ledges(const OverhangConstants& constants, const ResistanceConstants& resistance,
+                     const OverhangInput& input, const RectangleShape& shape,
+                     const LayerHeights& layers);
+
     std::vector<Overhang> overhangs_;
     std::vector<float> over_;
     std::vector<float> reach_;
     std::vector<float> highest_;
     std::vector<float> row_highest_;
+    std::vector<float> raw_tops_;      ///< planes: raw height of each ledge's top
+    std::vector<std::uint32_t> lean_;  ///< bit l: ledge l may lean out over the column
 };
 
 }  // namespace terrane

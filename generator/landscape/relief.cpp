@@ -11,7 +11,9 @@
 namespace terrane {
 namespace {
 
-constexpr std::size_t kValues = 4;
+constexpr std::size_t kValues = 4;      ///< of a lattice point: g, hr, pf, vm
+constexpr std::size_t kTilePoints = 4;  ///< a tile's side, in lattice points
+static_assert(kTilePoints * kTilePoints == kVectorPad);
 
 /// Weights of the four lattice points around a place, and their slopes a column.
 struct Taps {
@@ -31,6 +33,43 @@ Taps taps_at(std::int64_t eighths) {
                       (4.0F * s - 3.0F * s * s) * kPerColumn, t * t * kPerColumn}};
 }
 
+using AllTaps = std::array<Taps, kLatticeStep>;
+
+/// A row of columns next to each other, from values of its lattice columns, `lines` a plane: cell
+/// by cell, in which the four points are the same.
+void mix_columns(const std::array<float*, kValues + 1>& to, float* slope_x, const float* mixed,
+                 std::size_t lines, const AllTaps& taps, std::int32_t first_eighth,
+                 std::int32_t width) {
+    constexpr auto kStep = static_cast<std::int32_t>(kLatticeStep);
+    std::array<std::array<float, kLatticeStep>, 4> weight;
+    std::array<std::array<float, kLatticeStep>, 4> slope;
+    for (std::size_t p = 0; p < 4; ++p) {
+        for (std::size_t e = 0; e < kLatticeStep; ++e) {
+            weight[p][e] = taps[e].weight[p];
+            slope[p][e] = taps[e].slope[p];
+        }
+    }
+    const auto mix_cell = [](float* out, const float* value, const auto& share, std::int32_t from,
+                             std::int32_t count) {
+        std::array<float, kLatticeStep> sum;
+        for (std::size_t e = 0; e < kLatticeStep; ++e) {
+            sum[e] = share[0][e] * value[0] + share[1][e] * value[1] + share[2][e] * value[2] +
+                     share[3][e] * value[3];
+        }
+        std::copy_n(sum.data() + from, count, out);
+    };
+    std::int32_t from = first_eighth;
+    for (std::int32_t column = 0; column < width; ++mixed) {
+        const std::int32_t count = std::min(kStep - from, width - column);
+        for (std::size_t v = 0; v <= kValues; ++v) {
+            mix_cell(to[v] + column, mixed + v * lines, weight, from, count);
+        }
+        mix_cell(slope_x + column, mixed, slope, from, count);
+        column += count;
+        from = 0;
+    }
+}
+
 /// A place moved by the noise that makes rivers wind.
 struct MovedPlace {
     std::int64_t x = 0;
@@ -48,53 +87,6 @@ MovedPlace moved(std::int64_t x, std::int64_t z, float by_x, float by_z) {
             .z_rest = by_z - whole_z};
 }
 
-struct Valley {
-    float river = 0;
-    float crest = 0;
-};
-
-float crest_of(const ReliefConstants& constants, float t) {
-    const float square = t * t;
-    return lerp(std::sqrt(square + 0.03F) - 0.173F, square / (square + 0.15F), constants.plateau);
-}
-
-Valley valley_at(const ReliefConstants& constants, const RiverGraph& rivers,
-                 const MovedPlace& place) {
-    const float reach = 1.1F * constants.valley;
-    const float inverse_reach_square = 1.0F / (reach * reach);
-    const float e2 = 0.0025F * constants.valley * constants.valley;
-    const std::int64_t row = constants.rivers.row_of(place.z);
-    const std::int64_t cell = constants.rivers.cell_of(place.x, row);
-    float sum = 0;
-    float level = 0;
-    for (std::int64_t j = row - kRiverReachCells; j <= row + kRiverReachCells; ++j) {
-        for (std::int64_t i = cell - kRiverReachCells; i <= cell + kRiverReachCells; ++i) {
-            const Reach& one = rivers.reach(i, j);
-            const float x = static_cast<float>(place.x - one.x) + place.x_rest;
-            const float z = static_cast<float>(place.z - one.z) + place.z_rest;
-            if (x < one.x_min - reach || x > one.x_max + reach || z < one.z_min - reach ||
-                z > one.z_max + reach) {
-                continue;
-            }
-            const OnReach nearest = nearest_on(one, x, z);
-            const float rest = 1.0F - nearest.square * inverse_reach_square;
-            if (rest > 0) {
-                const float inverse = rest / (nearest.square + e2);
-                const float weight = inverse * inverse;
-                sum += weight;
-                level += weight * (one.level + one.level_change * nearest.along);
-            }
-        }
-    }
-    if (sum <= 0) {
-        return {.river = constants.rivers.potential_at(place.x, place.z),
-                .crest = crest_of(constants, 1.4F)};
-    }
-    const float distance = std::sqrt(std::max(0.0F, 1.0F / std::sqrt(sum) - e2));
-    return {.river = level / sum,
-            .crest = crest_of(constants, std::min(1.4F, distance / (0.5F * constants.valley)))};
-}
-
 float mountain_of(float noise) {
     return 0.1F + 0.9F * smooth_step(-0.2F, 0.3F, noise);
 }
@@ -103,26 +95,33 @@ float mountain_of(float noise) {
 
 /// The lattice lines that the columns of one axis need, and where each column finds its own.
 struct ReliefBuilder::Axis {
-    std::vector<std::int64_t> lines;   ///< lattice numbers, ascending
+    std::vector<std::int64_t> lines;   ///< columns of the lattice's lines, ascending
     std::vector<std::int32_t> first;   ///< per column: entry of its first point
     std::vector<std::uint8_t> eighth;  ///< per column: how far behind its second point
     std::size_t points = 4;            ///< of which a column's value is made
 
+    std::size_t stride() const {
+        return static_cast<std::size_t>(padded_width(static_cast<std::int32_t>(lines.size())));
+    }
+
     Axis(std::int64_t start, std::int32_t count, std::int64_t step) {
         // Right on a line the fourth point weighs nothing.
         points = start % kLatticeStep == 0 && step % kLatticeStep == 0 ? 3 : 4;
+        std::int64_t newest = 0;
         for (std::int32_t i = 0; i < count; ++i) {
             const std::int64_t at = start + i * step;
             const std::int64_t line = floor_div(at, kLatticeStep);
             eighth.push_back(static_cast<std::uint8_t>(at - line * kLatticeStep));
             const std::int64_t last = line + static_cast<std::int64_t>(points) - 2;
-            const std::int64_t from =
-                lines.empty() ? line - 1 : std::max(lines.back() + 1, line - 1);
-            for (std::int64_t one = from; one <= last; ++one) {
-                lines.push_back(one);
+            if (i == 0) {
+                newest = line - 2;
+            }
+            for (std::int64_t one = std::max(newest + 1, line - 1); one <= last; ++one) {
+                lines.push_back(one * kLatticeStep);
+                newest = one;
             }
             first.push_back(static_cast<std::int32_t>(static_cast<std::int64_t>(lines.size()) - 1 -
-                                                      (lines.back() - (line - 1))));
+                                                      (newest - (line - 1))));
         }
     }
 };
@@ -148,24 +147,95 @@ void ReliefBuilder::find_rivers(const RiverConstants& constants, const Rectangle
     rivers_.build(constants, {.first_i = i0, .last_i = i1, .first_j = j0, .last_j = j1});
 }
 
-void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z) {
-    lattice_.resize(x.lines.size() * z.lines.size() * kValues);
-    float* value = lattice_.data();
+void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                              std::size_t first_x, std::size_t first_z, const RowKernels& kernels) {
     const RiverConstants& rivers = constants.rivers;
-    for (const std::int64_t line_z : z.lines) {
-        for (const std::int64_t line_x : x.lines) {
-            const std::int64_t at_x = line_x * kLatticeStep;
-            const std::int64_t at_z = line_z * kLatticeStep;
-            const Valley valley =
-                valley_at(constants, rivers_,
-                          moved(at_x, at_z, rivers.wander * noise_at(rivers.wander_x, at_x, at_z),
-                                rivers.wander * noise_at(rivers.wander_z, at_x, at_z)));
-            const float mountain = mountain_of(noise_at(constants.mountains, at_x, at_z));
-            value[0] = valley.river + constants.height * mountain * valley.crest;
-            value[1] = valley.river;
-            value[2] = valley.crest;
-            value[3] = mountain;
-            value += kValues;
+    const std::size_t stride = x.stride();
+    const std::size_t plane = stride * z.lines.size() + kVectorPad;
+    const float* const wander_x = lattice_.data() + kValues * plane;
+    const float* const wander_z = wander_x + plane;
+    const std::int64_t origin_x = x.lines[first_x];
+    const std::int64_t origin_z = z.lines[first_z];
+    ValleyPlaces places;
+    std::array<MovedPlace, kVectorPad> moved_to;
+    std::array<std::size_t, kVectorPad> at;
+    std::int64_t x_min = INT64_MAX;
+    std::int64_t x_max = INT64_MIN;
+    std::int64_t z_min = INT64_MAX;
+    std::int64_t z_max = INT64_MIN;
+    for (std::size_t n = 0; n < kVectorPad; ++n) {
+        // Beyond the lattice's end, its last points once more.
+        const std::size_t line_x = std::min(first_x + n % kTilePoints, x.lines.size() - 1);
+        const std::size_t line_z = std::min(first_z + n / kTilePoints, z.lines.size() - 1);
+        at[n] = line_z * stride + line_x;
+        moved_to[n] = moved(x.lines[line_x], z.lines[line_z], rivers.wander * wander_x[at[n]],
+                            rivers.wander * wander_z[at[n]]);
+        const MovedPlace& place = moved_to[n];
+        places.x[n] = static_cast<float>(place.x - origin_x);
+        places.z[n] = static_cast<float>(place.z - origin_z);
+        places.x_rest[n] = place.x_rest;
+        places.z_rest[n] = place.z_rest;
+        x_min = std::min(x_min, place.x);
+        x_max = std::max(x_max, place.x + 1);
+        z_min = std::min(z_min, place.z);
+        z_max = std::max(z_max, place.z + 1);
+    }
+    const float reach = 1.1F * constants.valley;
+    const float slack = reach + 1.0F;  // far above rounding errors: what is left out weighs 0
+    const Reach& first = rivers_.reaches().front();
+    near_.clear();
+    rivers_.for_each_meeting({.first_i = rivers.cell_of(x_min, 1) - kRiverReachCells,
+                              .last_i = rivers.cell_of(x_max, 0) + kRiverReachCells,
+                              .first_j = rivers.row_of(z_min) - kRiverReachCells,
+                              .last_j = rivers.row_of(z_max) + kRiverReachCells},
+                             {.x_min = static_cast<float>(x_min - first.x) - slack,
+                              .x_max = static_cast<float>(x_max - first.x) + slack,
+                              .z_min = static_cast<float>(z_min - first.z) - slack,
+                              .z_max = static_cast<float>(z_max - first.z) + slack},
+                             [&](const Reach& one) {
+                                 ReachShape& shape = near_.emplace_back();
+                                 shape.x = static_cast<float>(one.x - origin_x);
+                                 shape.z = static_cast<float>(one.z - origin_z);
+                                 std::copy(one.px.begin(), one.px.end(), shape.px);
+                                 std::copy(one.pz.begin(), one.pz.end(), shape.pz);
+                                 std::copy(one.inverse_square.begin(), one.inverse_square.end(),
+                                           shape.inverse_square);
+                                 shape.level = one.level;
+                                 shape.level_change = one.level_change;
+                             });
+    kernels.valleys(places, near_.data(), static_cast<std::int32_t>(near_.size()),
+                    {.inverse_reach_square = 1.0F / (reach * reach),
+                     .e2 = 0.0025F * constants.valley * constants.valley,
+                     .half_valley = 0.5F * constants.valley,
+                     .plateau = constants.plateau});
+    for (std::size_t n = 0; n < kVectorPad; ++n) {
+        float* const value = lattice_.data() + at[n];
+        value[plane] = places.weight[n] > 0 ? places.river[n]
+                                            : rivers.potential_at(moved_to[n].x, moved_to[n].z);
+        value[2 * plane] = places.crest[n];
+    }
+}
+
+void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                                 const RowKernels& kernels, NoiseBuffers& buffers) {
+    const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
+    lattice_.resize(std::max(lattice_.size(), plane * (kValues + 2)));
+    float* const ground = lattice_.data();
+    float* const river = ground + plane;
+    float* const crest = river + plane;
+    float* const mountain = crest + plane;
+    noise_grid(mountain, constants.mountains, x.lines, z.lines, kernels, buffers);
+    noise_grid(mountain + plane, constants.rivers.wander_x, x.lines, z.lines, kernels, buffers);
+    noise_grid(mountain + 2 * plane, constants.rivers.wander_z, x.lines, z.lines, kernels, buffers);
+    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += kTilePoints) {
+        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += kTilePoints) {
+            fill_tile(constants, x, z, line_x, line_z, kernels);
+        }
+    }
+    for (std::size_t line_z = 0; line_z < z.lines.size(); ++line_z) {
+        for (std::size_t i = line_z * x.stride(); i < line_z * x.stride() + x.lines.size(); ++i) {
+            mountain[i] = mountain_of(mountain[i]);
+            ground[i] = river[i] + constants.height * mountain[i] * crest[i];
         }
     }
 }
@@ -197,50 +267,60 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
     find_rivers(constants.rivers, shape);
     const Axis x(shape.x0, shape.width, shape.step);
     const Axis z(shape.z0, shape.length, shape.step);
-    fill_lattice(constants, x, z);
-    std::array<Taps, kLatticeStep> taps;
+    fill_lattice(constants, x, z, kernels, buffers);
+    AllTaps taps;
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
     // Rows of the lattice first, mixed along z: five values a lattice column, g's slope along z
     // too.
-    const std::size_t lines = x.lines.size();
-    std::vector<float> mixed(lines * (kValues + 1));
+    const std::size_t lines = x.stride();
+    const std::size_t plane = lines * z.lines.size() + kVectorPad;
+    mixed_.resize(std::max(mixed_.size(), lines * (kValues + 1)));
     for (std::int32_t row = 0; row < shape.length; ++row) {
         const Taps& along_z = taps[z.eighth[static_cast<std::size_t>(row)]];
         const auto line_z = static_cast<std::size_t>(z.first[static_cast<std::size_t>(row)]);
-        for (std::size_t line = 0; line < lines; ++line) {
-            std::array<float, kValues + 1> sum{};
-            for (std::size_t p = 0; p < z.points; ++p) {
-                const float* const value =
-                    lattice_.data() + ((line_z + p) * lines + line) * kValues;
-                for (std::size_t v = 0; v < kValues; ++v) {
-                    sum[v] += along_z.weight[p] * value[v];
+        for (std::size_t v = 0; v <= kValues; ++v) {
+            const float* const value = lattice_.data() + v % kValues * plane + line_z * lines;
+            const std::array<float, 4>& weight = v < kValues ? along_z.weight : along_z.slope;
+            float* const sum = mixed_.data() + v * lines;
+            if (z.points == 4) {
+                for (std::size_t line = 0; line < lines; ++line) {
+                    sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
+                                weight[2] * value[2 * lines + line] +
+                                weight[3] * value[3 * lines + line];
                 }
-                sum[kValues] += along_z.slope[p] * value[0];
+            } else {
+                for (std::size_t line = 0; line < lines; ++line) {
+                    sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
+                                weight[2] * value[2 * lines + line];
+                }
             }
-            std::copy(sum.begin(), sum.end(),
-                      mixed.begin() + static_cast<std::ptrdiff_t>(line * (kValues + 1)));
+        }
+        const auto first = static_cast<std::size_t>(row * shape.stride());
+        const std::array<float*, kValues + 1> to = {
+            out.ground.data() + first, out.river.data() + first, out.crest.data() + first,
+            out.mountain.data() + first, out.slope_z.data() + first};
+        if (shape.step == 1) {
+            mix_columns(to, out.slope_x.data() + first, mixed_.data(), lines, taps,
+                        x.eighth.front(), shape.width);
+            continue;
         }
         for (std::int32_t column = 0; column < shape.width; ++column) {
             const Taps& along_x = taps[x.eighth[static_cast<std::size_t>(column)]];
             const float* value =
-                mixed.data() +
-                static_cast<std::size_t>(x.first[static_cast<std::size_t>(column)]) * (kValues + 1);
+                mixed_.data() + static_cast<std::size_t>(x.first[static_cast<std::size_t>(column)]);
             std::array<float, kValues + 2> sum{};
-            for (std::size_t p = 0; p < x.points; ++p, value += kValues + 1) {
+            for (std::size_t p = 0; p < x.points; ++p, ++value) {
                 for (std::size_t v = 0; v <= kValues; ++v) {
-                    sum[v] += along_x.weight[p] * value[v];
+                    sum[v] += along_x.weight[p] * value[v * lines];
                 }
                 sum[kValues + 1] += along_x.slope[p] * value[0];
             }
-            const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-            out.ground[i] = sum[0];
-            out.river[i] = sum[1];
-            out.crest[i] = sum[2];
-            out.mountain[i] = sum[3];
-            out.slope_z[i] = sum[4];
-            out.slope_x[i] = sum[5];
+            for (std::size_t v = 0; v <= kValues; ++v) {
+                to[v][column] = sum[v];
+            }
+            out.slope_x[first + static_cast<std::size_t>(column)] = sum[kValues + 1];
         }
     }
     noise_rectangle(out.wander_x.data(), constants.rivers.wander_x, shape, kernels, buffers);

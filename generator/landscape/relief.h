@@ -10,8 +10,10 @@
 //     g = hr + height * vm * pf
 //
 // The sum is a smooth minimum of distances, so that valleys meet in crests (Genevaux et al. 2013)
-// without sorting or a pass over the map. Columns take the uniform cubic B-spline of 4 x 4 points,
-// and its gradient. Levels whose step exceeds the valley take the mean between river and crest.
+// without sorting or a pass over the map. Only reaches of nodes at most kRiverReachCells away come
+// so near; 4 x 4 points of the lattice at a time look at those whose boxes come near one of them.
+// Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient. Levels whose step
+// exceeds the valley take the mean between river and crest.
 #pragma once
 
 #include "generator/landscape/river_graph.h"
@@ -61,10 +63,15 @@ class ReliefBuilder {
     struct Axis;
 
     void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
-    void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z);
+    void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                      const RowKernels& kernels, NoiseBuffers& buffers);
+    void fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                   std::size_t first_x, std::size_t first_z, const RowKernels& kernels);
 
     RiverGraph rivers_;
-    std::vector<float> lattice_;  ///< points of four values: g, hr, pf, vm
+    std::vector<float> lattice_;    ///< planes of g, hr, pf, vm and how a place is moved in x and z
+    std::vector<ReachShape> near_;  ///< of one tile of the lattice
+    std::vector<float> mixed_;      ///< one row of the lattice, mixed along z
 };
 
 }  // namespace terrane

@@ -35,6 +35,7 @@ void resist(float* height, float* rest, const float* over, const ResistanceConst
         const LayerResistance layer = constants.layers[k];
         const float* const top = layers.first + k * layers.plane;
         const float* const bottom = k > 0 ? top - layers.plane : nullptr;
+        std::int32_t is_left = 0;
         for (std::size_t i = 0; i < count; ++i) {
             const float thickness = bottom != nullptr ? top[i] - bottom[i] : top[i];
             const float limit = thickness * layer.cost;
@@ -42,6 +43,10 @@ void resist(float* height, float* rest, const float* over, const ResistanceConst
             height[i] += m * m * (1.0F + layer.concave) / (m + layer.concave * limit + 1e-9F) *
                          layer.inverse_cost;
             rest[i] -= limit;
+            is_left |= static_cast<std::int32_t>(rest[i] > 0);
+        }
+        if (is_left == 0) {
+            break;  // higher layers would add 0
         }
     }
 }

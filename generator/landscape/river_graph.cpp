@@ -220,6 +220,7 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
     const NodeGrid nodes(constants, range);
     range_ = range;
     reaches_.clear();
+    boxes_.clear();
     for (std::int64_t j = range.first_j; j <= range.last_j; ++j) {
         for (std::int64_t i = range.first_i; i <= range.last_i; ++i) {
             const Node& node = nodes.at(i, j);
@@ -236,6 +237,12 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
                 shape_reach(reach, node, next);
             }
             reaches_.push_back(reach);
+            const auto x = static_cast<float>(reach.x - reaches_.front().x);
+            const auto z = static_cast<float>(reach.z - reaches_.front().z);
+            boxes_.push_back({.x_min = x + reach.x_min,
+                              .x_max = x + reach.x_max,
+                              .z_min = z + reach.z_min,
+                              .z_max = z + reach.z_max});
         }
     }
 }

@@ -17,6 +17,7 @@
 // Everything that looks a place up first moves it by a noise, which makes the rivers wind.
 #pragma once
 
+#include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/noise.h"
 #include "generator/world/world_definition.h"
 
@@ -26,7 +27,6 @@
 
 namespace terrane {
 
-inline constexpr std::int32_t kReachSegments = 4;
 inline constexpr std::int32_t kUpstreamSteps = 3;
 /// The nodes that can matter to a place: so many cells around its own.
 inline constexpr std::int64_t kRiverReachCells = 3;
@@ -81,6 +81,13 @@ struct OnReach {
 
 OnReach nearest_on(const Reach& reach, float x, float z);
 
+struct ReachBox {
+    float x_min = 0;
+    float x_max = 0;
+    float z_min = 0;
+    float z_max = 0;
+};
+
 /// Cells first_i <= i <= last_i, likewise j.
 struct CellRange {
     std::int64_t first_i = 0;
@@ -99,17 +106,32 @@ class RiverGraph {
 
     void build(const RiverConstants& constants, const CellRange& range);
 
-    const Reach& reach(std::int64_t i, std::int64_t j) const {
-        return reaches_[static_cast<std::size_t>(
-            (j - range_.first_j) * (range_.last_i - range_.first_i + 1) + (i - range_.first_i))];
-    }
-
     /// By row, then along it.
     const std::vector<Reach>& reaches() const { return reaches_; }
+
+    /// Calls `use(reach)` for those of `range` whose boxes may meet `box`, in order. Boxes are
+    /// floats, in columns from the first reach's node: `box` must have some slack.
+    template <typename Use>
+    void for_each_meeting(const CellRange& range, const ReachBox& box, Use use) const {
+        const std::int64_t width = range_.last_i - range_.first_i + 1;
+        for (std::int64_t j = range.first_j; j <= range.last_j; ++j) {
+            const auto row = static_cast<std::size_t>((j - range_.first_j) * width);
+            const auto end = row + static_cast<std::size_t>(range.last_i - range_.first_i);
+            for (auto n = row + static_cast<std::size_t>(range.first_i - range_.first_i); n <= end;
+                 ++n) {
+                const ReachBox& one = boxes_[n];
+                if (one.x_min <= box.x_max && one.x_max >= box.x_min && one.z_min <= box.z_max &&
+                    one.z_max >= box.z_min) {
+                    use(reaches_[n]);
+                }
+            }
+        }
+    }
 
   private:
     CellRange range_;
     std::vector<Reach> reaches_;
+    std::vector<ReachBox> boxes_;
 };
 
 }  // namespace terrane

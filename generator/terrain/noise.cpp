@@ -36,6 +36,7 @@ constexpr std::array<Gradient, 16> kGradients = {{
 
 /// Cells narrower than this go column by column: a cell-wise block would mostly be thrown away.
 constexpr float kWideCellPeriod = 8;
+constexpr std::int32_t kWideCellColumns = 6;  ///< the same for columns that are listed
 
 Gradient gradient_at(std::uint64_t row_hash, std::int64_t cell_z) {
     return kGradients[combine(row_hash, static_cast<std::uint64_t>(cell_z)) >> 60U];
@@ -89,28 +90,42 @@ float octave_at(const NoiseOctave& octave, std::int64_t x, std::int64_t z) {
     return octave.amplitude * (v0 + u * (v1 - v0));
 }
 
+/// The positions of one axis: `count` from `first` on, evenly apart unless they are listed.
+struct Axis {
+    std::int64_t first = 0;
+    std::int64_t step = 0;
+    std::int32_t count = 0;
+    const std::int64_t* listed = nullptr;  ///< null: first, first + step, ...
+};
+
+Axis axis_of(std::span<const std::int64_t> listed) {
+    return {.first = listed.front(),
+            .count = static_cast<std::int32_t>(listed.size()),
+            .listed = listed.data()};
+}
+
 /// Hands out pieces of the buffers; they are sized before any piece is taken.
 class Pieces {
   public:
-    Pieces(NoiseBuffers& buffers, const RectangleShape& shape, std::int32_t octaves) {
-        const auto row = static_cast<std::size_t>(shape.stride() + 2 * kVectorPad);
-        const auto length = static_cast<std::size_t>(shape.length);
-        const auto lattice = lattice_row(shape) * 2 * length;
+    Pieces(NoiseBuffers& buffers, std::int32_t width, std::int32_t rows, std::int32_t octaves) {
+        const auto row = static_cast<std::size_t>(padded_width(width) + 2 * kVectorPad);
+        const auto length = static_cast<std::size_t>(rows);
+        const auto lattice = lattice_row(width) * 2 * length;
         const auto count = static_cast<std::size_t>(octaves);
         const auto grow = [](auto& buffer, std::size_t size) {
             buffer.resize(std::max(buffer.size(), size));
         };
         grow(buffers.floats, count * (2 * row + length + 2 * lattice));
         grow(buffers.integers, count * (2 * row + 2 + length));
-        grow(buffers.hashes, lattice_row(shape));
+        grow(buffers.hashes, lattice_row(width));
         floats_ = buffers.floats.data();
         integers_ = buffers.integers.data();
         hashes_ = buffers.hashes.data();
     }
 
     /// At most two lattice columns a column, in whole blocks.
-    static std::size_t lattice_row(const RectangleShape& shape) {
-        return static_cast<std::size_t>(padded_width(2 * shape.width));
+    static std::size_t lattice_row(std::int32_t width) {
+        return static_cast<std::size_t>(padded_width(2 * width));
     }
 
     float* floats(std::size_t count) { return std::exchange(floats_, floats_ + count); }
@@ -132,10 +147,12 @@ class Pieces {
 /// leave out the lines between; near ones share theirs.
 class LatticeLines {
   public:
-    LatticeLines(std::int64_t first, std::int64_t step, std::uint64_t frequency,
-                 std::uint64_t offset)
-        : position_(fixed_point(first, frequency, offset)),
-          step_(fixed_point(step, frequency, 0)) {}
+    LatticeLines(const Axis& axis, std::uint64_t frequency, std::uint64_t offset)
+        : position_(fixed_point(axis.first, frequency, offset)),
+          step_(fixed_point(axis.step, frequency, 0)),
+          frequency_(frequency),
+          listed_(axis.listed),
+          left_(axis.count) {}
 
     struct Next {
         float fraction = 0;
@@ -146,7 +163,7 @@ class LatticeLines {
 
     Next next() {
         const LatticePosition position = split(position_);
-        position_ += step_;
+        advance();
         Next next{.fraction = position.fraction, .cell = position.cell};
         if (count_ > 0 && position.cell == last_cell_) {
             next.new_lines = 0;
@@ -164,26 +181,38 @@ class LatticeLines {
     std::int32_t count() const { return count_; }
 
   private:
+    void advance() {
+        if (listed_ != nullptr && --left_ > 0) {
+            step_ = fixed_point(listed_[1] - listed_[0], frequency_, 0);
+            ++listed_;
+        }
+        position_ += step_;
+    }
+
     Wide position_;
     Wide step_;
+    std::uint64_t frequency_;
+    const std::int64_t* listed_;
+    std::int32_t left_;
     std::int64_t last_cell_ = 0;
     std::int32_t count_ = 0;
 };
 
 /// Fills the columns' part of `rows` and the hashes of the lattice columns.
-void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave,
-                     const RectangleShape& shape) {
-    const auto row = static_cast<std::size_t>(shape.stride() + 2 * kVectorPad);
+void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave, const Axis& axis) {
+    const auto row = static_cast<std::size_t>(padded_width(axis.count) + 2 * kVectorPad);
     float* const fraction_x = pieces.floats(row);
     float* const fade_x = pieces.floats(row);
     std::int32_t* const column_cell = pieces.integers(row);
     std::int32_t* const cell_begin = pieces.integers(row + 2);
-    LatticeLines lines(shape.x0, shape.step, octave.frequency, octave.offset_x);
-    for (std::int32_t i = 0; i < shape.width; ++i) {
+    LatticeLines lines(axis, octave.frequency, octave.offset_x);
+    bool follow_each_other = true;
+    for (std::int32_t i = 0; i < axis.count; ++i) {
         const LatticeLines::Next next = lines.next();
         fraction_x[i] = next.fraction;
         fade_x[i] = fade(next.fraction);
         column_cell[i] = next.entry;
+        follow_each_other = follow_each_other && (i == 0 || next.new_lines < 2);
         if (next.new_lines > 0) {
             // Wide cells follow each other, so that entries count cells.
             cell_begin[std::min(next.entry, i)] = i;
@@ -194,31 +223,34 @@ void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave,
         }
     }
     rows.lattice_columns = lines.count();
-    rows.wide_cells = octave.period >= kWideCellPeriod * static_cast<float>(shape.step);
+    rows.wide_cells =
+        axis.listed == nullptr
+            ? octave.period >= kWideCellPeriod * static_cast<float>(axis.step)
+            : follow_each_other && axis.count >= kWideCellColumns * (lines.count() - 1);
     if (rows.wide_cells) {
-        cell_begin[rows.lattice_columns - 1] = shape.width;
+        cell_begin[rows.lattice_columns - 1] = axis.count;
     }
-    std::fill(fraction_x + shape.width, fraction_x + row, 0.0F);
-    std::fill(fade_x + shape.width, fade_x + row, 0.0F);
-    std::fill(column_cell + shape.width, column_cell + row, 0);
+    std::fill(fraction_x + axis.count, fraction_x + row, 0.0F);
+    std::fill(fade_x + axis.count, fade_x + row, 0.0F);
+    std::fill(column_cell + axis.count, column_cell + row, 0);
     rows.fraction_x = fraction_x;
     rows.fade_x = fade_x;
     rows.column_cell = column_cell;
     rows.cell_begin = cell_begin;
 }
 
-NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const RectangleShape& shape,
+NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const Axis& x, const Axis& z,
                          const RowKernels& kernels) {
     NoiseRows rows;
     rows.amplitude = octave.amplitude;
-    prepare_columns(rows, pieces, octave, shape);
-    const auto length = static_cast<std::size_t>(shape.length);
+    prepare_columns(rows, pieces, octave, x);
+    const auto length = static_cast<std::size_t>(z.count);
     float* const fraction_z = pieces.floats(length);
     std::int32_t* const row_cell = pieces.integers(length);
-    const std::size_t lattice = Pieces::lattice_row(shape) * 2 * length;
+    const std::size_t lattice = Pieces::lattice_row(x.count) * 2 * length;
     float* const gradient_x = pieces.floats(lattice);
     float* const gradient_z = pieces.floats(lattice);
-    LatticeLines lines(shape.z0, shape.step, octave.frequency, octave.offset_z);
+    LatticeLines lines(z, octave.frequency, octave.offset_z);
     for (std::size_t i = 0; i < length; ++i) {
         const LatticeLines::Next next = lines.next();
         fraction_z[i] = next.fraction;
@@ -236,6 +268,18 @@ NoiseRows prepare_octave(Pieces& pieces, const NoiseOctave& octave, const Rectan
     rows.gradient_x = gradient_x;
     rows.gradient_z = gradient_z;
     return rows;
+}
+
+void fill_noise(float* out, std::int32_t stride, const Noise& noise, const Axis& x, const Axis& z,
+                const RowKernels& kernels, NoiseBuffers& buffers) {
+    TERRANE_ASSERT(x.count >= 1 && x.count <= kRectangleSideMax && z.count >= 1 &&
+                   z.count <= kRectangleSideMax);
+    Pieces pieces(buffers, x.count, z.count, noise.octave_count);
+    std::array<NoiseRows, kNoiseOctavesMax> rows;
+    for (std::size_t o = 0; o < static_cast<std::size_t>(noise.octave_count); ++o) {
+        rows[o] = prepare_octave(pieces, noise.octaves[o], x, z, kernels);
+    }
+    kernels.noise(out, stride, x.count, z.count, rows.data(), noise.octave_count);
 }
 
 }  // namespace
@@ -274,14 +318,25 @@ float noise_at(const Noise& noise, std::int64_t x, std::int64_t z) {
 
 void noise_rectangle(float* out, const Noise& noise, const RectangleShape& shape,
                      const RowKernels& kernels, NoiseBuffers& buffers) {
-    TERRANE_ASSERT(shape.width >= 1 && shape.width <= kRectangleSideMax && shape.length >= 1 &&
-                   shape.length <= kRectangleSideMax);
-    Pieces pieces(buffers, shape, noise.octave_count);
-    std::array<NoiseRows, kNoiseOctavesMax> rows;
-    for (std::size_t o = 0; o < static_cast<std::size_t>(noise.octave_count); ++o) {
-        rows[o] = prepare_octave(pieces, noise.octaves[o], shape, kernels);
+    fill_noise(out, shape.stride(), noise,
+               {.first = shape.x0, .step = shape.step, .count = shape.width},
+               {.first = shape.z0, .step = shape.step, .count = shape.length}, kernels, buffers);
+}
+
+void noise_grid(float* out, const Noise& noise, std::span<const std::int64_t> xs,
+                std::span<const std::int64_t> zs, const RowKernels& kernels,
+                NoiseBuffers& buffers) {
+    constexpr auto kMost = static_cast<std::size_t>(kRectangleSideMax);
+    static_assert(kRectangleSideMax % kVectorPad == 0, "a piece's last block ends where it ends");
+    const std::int32_t stride = padded_width(static_cast<std::int32_t>(xs.size()));
+    for (std::size_t z = 0; z < zs.size(); z += kMost) {
+        // From left to right: blocks run over into columns that come later.
+        for (std::size_t x = 0; x < xs.size(); x += kMost) {
+            fill_noise(out + z * static_cast<std::size_t>(stride) + x, stride, noise,
+                       axis_of(xs.subspan(x, std::min(kMost, xs.size() - x))),
+                       axis_of(zs.subspan(z, std::min(kMost, zs.size() - z))), kernels, buffers);
+        }
     }
-    kernels.noise(out, shape.stride(), shape.width, shape.length, rows.data(), noise.octave_count);
 }
 
 }  // namespace terrane

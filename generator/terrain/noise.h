@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace terrane {
@@ -65,5 +66,10 @@ struct NoiseBuffers {
 /// Fills `out` (padded_size() floats) with the noise, bit for bit noise_at's.
 void noise_rectangle(float* out, const Noise& noise, const RectangleShape& shape,
                      const RowKernels& kernels, NoiseBuffers& buffers);
+
+/// The noise at every (x, z) of two ascending lists of columns, which need not be evenly apart nor
+/// few: rows of padded_width(xs.size()) values and kVectorPad behind them, bit for bit noise_at's.
+void noise_grid(float* out, const Noise& noise, std::span<const std::int64_t> xs,
+                std::span<const std::int64_t> zs, const RowKernels& kernels, NoiseBuffers& buffers);
 
 }  // namespace terrane

@@ -132,27 +132,6 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
     }
 }
 
-void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,
-                const RowKernels& kernels) {
-    const RectangleShape inner{.x0 = region.inner.x0,
-                               .z0 = region.inner.z0,
-                               .width = region.inner.width,
-                               .length = region.inner.length,
-                               .step = region.shape.step};
-    const float half_per_step = 0.5F / static_cast<float>(inner.step);
-    noise_rectangle(region.noise.data(), constants.flow_noise[layer], inner, kernels,
-                    region.noise_buffers);
-    const std::int32_t stride = region.shape.stride();
-    const float* const heights = region.heights.data() + layer * region.plane_size();
-    std::int32_t* const flow = region.flow.data() + layer * region.flow_plane_size();
-    for (std::int32_t row = 0; row < inner.length; ++row) {
-        kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     heights + static_cast<std::ptrdiff_t>(row + 1) * stride + 1, stride,
-                     region.flow_stride, half_per_step);
-    }
-}
-
 void allocate(Region& region, std::size_t layers) {
     const std::size_t plane = region.plane_size();
     grow(region.stacked, plane);
@@ -188,6 +167,27 @@ TerrainConstants::TerrainConstants(const World& world) {
     }
 }
 
+void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,
+                const RowKernels& kernels) {
+    const RectangleShape inner{.x0 = region.inner.x0,
+                               .z0 = region.inner.z0,
+                               .width = region.inner.width,
+                               .length = region.inner.length,
+                               .step = region.shape.step};
+    const float half_per_step = 0.5F / static_cast<float>(inner.step);
+    noise_rectangle(region.noise.data(), constants.flow_noise[layer], inner, kernels,
+                    region.noise_buffers);
+    const std::int32_t stride = region.shape.stride();
+    const float* const heights = region.heights.data() + layer * region.plane_size();
+    std::int32_t* const flow = region.flow.data() + layer * region.flow_plane_size();
+    for (std::int32_t row = 0; row < inner.length; ++row) {
+        kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+                     region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+                     heights + static_cast<std::ptrdiff_t>(row + 1) * stride + 1, stride,
+                     region.flow_stride, half_per_step);
+    }
+}
+
 void build_region(Region& region, const World& world, const TerrainConstants& constants,
                   const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels) {
     TERRANE_ASSERT(rectangle.width >= 1 && rectangle.width <= kRectangleSideMax - 2 &&
@@ -208,6 +208,7 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
     std::fill_n(region.middle.begin(), plane, 0);
     std::fill_n(region.stacked.begin(), plane, 1.0F);  // the base is never thinner than a voxel
     const auto values = static_cast<std::int32_t>(plane);
+    const bool is_plain = !world.definition.has_landscape();
     for (std::size_t k = 0; k < layers; ++k) {
         noise_rectangle(region.noise.data(), constants.height_noise[k], region.shape, kernels,
                         region.noise_buffers);
@@ -216,7 +217,7 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
                         constants.heights[k]);
         std::int32_t* const y256 = region.y256.data() + k * plane;
         kernels.quantise(y256, heights, values);
-        if (k > 0) {
+        if (k > 0 && is_plain) {
             kernels.blends(region.middle.data() + k * plane, region.irregular.data(), y256 - plane,
                            y256, constants.rules[k].blend_on_below, values);
         }
@@ -224,7 +225,9 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
         for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
             lay_element(region, region.elements[e], heights);
         }
-        build_flow(region, constants, k, kernels);
+        if (is_plain) {
+            build_flow(region, constants, k, kernels);
+        }
     }
 }
 

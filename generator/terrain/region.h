@@ -88,8 +88,13 @@ struct TerrainConstants {
     explicit TerrainConstants(const World& world);
 };
 
-/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results.
+/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results. A
+/// world with a landscape finds its blends later, and asks build_flow for the layers it shows.
 void build_region(Region& region, const World& world, const TerrainConstants& constants,
                   const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels);
+
+/// Fills one layer's plane of `region.flow`, once its heights are there.
+void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,
+                const RowKernels& kernels);
 
 }  // namespace terrane

@@ -323,7 +323,7 @@ void element_tile(float* __restrict thickness, float x, float z, float step,
 }
 
 float absolute(float x) {
-    return x < 0.0F ? -x : x;
+    return __builtin_fabsf(x);
 }
 
 /// Sine of -0.5..0.5 turns.
@@ -331,6 +331,9 @@ float sine(float t) {
     const float y = 8.0F * t - 16.0F * t * absolute(t);
     return 0.225F * (y * absolute(y) - y) + y;
 }
+
+/// Squared distance in cells beyond which a point counts for nothing; with slack for rounding.
+constexpr float kStripeReach = 1.563F;
 
 /// The stripes around a block's random points: three sums over them.
 struct Stripes {
@@ -340,10 +343,10 @@ struct Stripes {
 };
 
 void add_stripes(Stripes& stripes, const ErosionRow& row, std::int32_t first, std::int32_t point,
-                 const float* side_x, const float* side_z) {
-    const float* const px = row.points + point * row.plane + first;
-    const float* const pz = px + kErosionPoints * row.plane;
-    const float* const fx = row.fraction_x + first;
+                 const float* __restrict side_x, const float* __restrict side_z) {
+    const float* __restrict const px = row.points + point * row.plane + first;
+    const float* __restrict const pz = px + kErosionPoints * row.plane;
+    const float* __restrict const fx = row.fraction_x + first;
     for (std::int32_t i = 0; i < kBlock; ++i) {
         const float vx = fx[i] - px[i];
         const float vz = row.fraction_z - pz[i];
@@ -351,7 +354,7 @@ void add_stripes(Stripes& stripes, const ErosionRow& row, std::int32_t first, st
         const float k = rest > 0.0F ? rest * rest : 0.0F;
         const float phase = 0.75F * (vx * side_x[i] + vz * side_z[i]);
         // Below one turn where k is not 0: a shift by half a turn at most each way.
-        const float turn = phase > 0.5F ? phase - 1.0F : phase < -0.5F ? phase + 1.0F : phase;
+        const float turn = phase + ((phase > 0.5F ? -1.0F : 0.0F) + (phase < -0.5F ? 1.0F : 0.0F));
         stripes.cosine[i] += k * sine(0.25F - absolute(turn));
         stripes.sine[i] += k * sine(turn);
         stripes.weight[i] += k;
@@ -362,8 +365,8 @@ void erode(const ErosionRow& row) {
     for (std::int32_t first = 0; first < row.count; first += kBlock) {
         float side_x[kBlock];
         float side_z[kBlock];
-        float* const slope_x = row.slope_x + first;
-        float* const slope_z = row.slope_z + first;
+        float* __restrict const slope_x = row.slope_x + first;
+        float* __restrict const slope_z = row.slope_z + first;
         for (std::int32_t i = 0; i < kBlock; ++i) {
             const float x = slope_x[i];
             const float z = slope_z[i];
@@ -372,12 +375,21 @@ void erode(const ErosionRow& row) {
             side_z[i] = x * inverse;
         }
         Stripes stripes = {};
+        const ErosionBound* const bounds = row.bounds + first / kBlock * kErosionPoints;
         for (std::int32_t point = 0; point < kErosionPoints; ++point) {
-            add_stripes(stripes, row, first, point, side_x, side_z);
+            const ErosionBound bound = bounds[point];
+            const float below = bound.z_min - row.fraction_z;
+            const float above = row.fraction_z - bound.z_max;
+            const float dz = below > 0.0F ? below : above > 0.0F ? above : 0.0F;
+            if (bound.square_x + dz * dz < kStripeReach) {
+                add_stripes(stripes, row, first, point, side_x, side_z);
+            }  // else it would add zeros
         }
-        float* const mask = row.mask + first;
-        float* const fade_of = row.fade + first;
-        float* const sum = row.sum + first;
+        float* __restrict const mask = row.mask + first;
+        float* __restrict const fade_of = row.fade + first;
+        float* __restrict const sum = row.sum + first;
+        const float amplitude = row.amplitude;
+        const float steepening = row.steepening;
         for (std::int32_t i = 0; i < kBlock; ++i) {
             const float inverse = 1.0F / (stripes.weight[i] + 1e-9F);
             const float c0 = stripes.cosine[i] * inverse;
@@ -388,15 +400,68 @@ void erode(const ErosionRow& row) {
             const float s = s0 * strength;
             const float m = mask[i];
             const float delta = fade_of[i] + m * (c - fade_of[i]);
-            sum[i] += row.amplitude * delta;
+            sum[i] += amplitude * delta;
             fade_of[i] = delta;
             const float rest = 1.0F - m;
             const float open = 1.0F - clamp01(1.4F * absolute(s));
             mask[i] = (1.0F - rest * __builtin_sqrtf(rest)) * (1.0F - open * open);
-            const float turn = s < 0.0F ? row.steepening : -row.steepening;
+            const float turn = s < 0.0F ? steepening : -steepening;
             slope_x[i] += turn * side_x[i];
             slope_z[i] += turn * side_z[i];
         }
+    }
+}
+
+/// A piece of a reach at one place: keeps the nearest.
+struct Nearest {
+    float square = 1e30F;
+    float along = 0;
+};
+
+Nearest nearer(Nearest best, float x, float z, const ReachShape& reach, std::int32_t piece) {
+    const float ax = x - reach.px[piece];
+    const float az = z - reach.pz[piece];
+    const float ex = reach.px[piece + 1] - reach.px[piece];
+    const float ez = reach.pz[piece + 1] - reach.pz[piece];
+    const float t = clamp01((ax * ex + az * ez) * reach.inverse_square[piece]);
+    const float qx = ax - t * ex;
+    const float qz = az - t * ez;
+    const float square = qx * qx + qz * qz;
+    const float along = (static_cast<float>(piece) + t) / static_cast<float>(kReachSegments);
+    return {square < best.square ? square : best.square, square < best.square ? along : best.along};
+}
+
+void valleys(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count,
+             const ValleyConstants& constants) {
+    float sum[kBlock] = {};
+    float levels[kBlock] = {};
+    for (std::int32_t r = 0; r < count; ++r) {
+        const ReachShape reach = reaches[r];
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float x = (places.x[i] - reach.x) + places.x_rest[i];
+            const float z = (places.z[i] - reach.z) + places.z_rest[i];
+            static_assert(kReachSegments == 4);
+            Nearest nearest = nearer({}, x, z, reach, 0);
+            nearest = nearer(nearest, x, z, reach, 1);
+            nearest = nearer(nearest, x, z, reach, 2);
+            nearest = nearer(nearest, x, z, reach, 3);
+            const float rest = 1.0F - nearest.square * constants.inverse_reach_square;
+            const float inverse = (rest > 0.0F ? rest : 0.0F) / (nearest.square + constants.e2);
+            const float weight = inverse * inverse;
+            sum[i] += weight;
+            levels[i] += weight * (reach.level + reach.level_change * nearest.along);
+        }
+    }
+    for (std::int32_t i = 0; i < kBlock; ++i) {
+        places.weight[i] = sum[i];
+        places.river[i] = levels[i] / sum[i];
+        const float beyond = 1.0F / __builtin_sqrtf(sum[i]) - constants.e2;
+        const float distance = __builtin_sqrtf(beyond > 0.0F ? beyond : 0.0F);
+        const float share = distance / constants.half_valley;
+        const float t = share < 1.4F ? share : 1.4F;
+        const float square = t * t;
+        const float crest = __builtin_sqrtf(square + 0.03F) - 0.173F;
+        places.crest[i] = crest + constants.plateau * (square / (square + 0.15F) - crest);
     }
 }
 
@@ -411,6 +476,7 @@ const RowKernels kKernels = {.gradients = gradients,
                              .blends = blends,
                              .plain_columns = plain_columns,
                              .element_tile = element_tile,
-                             .erode = erode};
+                             .erode = erode,
+                             .valleys = valleys};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -74,6 +74,13 @@ struct PlainRow {
     std::int32_t layers = 0;
 };
 
+/// How near one random point can be to a block of columns in a row.
+struct ErosionBound {
+    float square_x = 0;  ///< least distance^2 along x
+    float z_min = 0;     ///< where the point lies
+    float z_max = 0;
+};
+
 /// One octave of a landscape's erosion filter over a row of columns, see
 /// generator/landscape/erosion.h.
 struct ErosionRow {
@@ -87,6 +94,7 @@ struct ErosionRow {
     /// kErosionPoints planes of x, then of z, `plane` values each.
     const float* points = nullptr;
     std::int64_t plane = 0;
+    const ErosionBound* bounds = nullptr;  ///< kErosionPoints for each block
     float fraction_z = 0;
     float amplitude = 0;     ///< voxels
     float steepening = 0;    ///< what a stripe adds to the slope
@@ -94,6 +102,37 @@ struct ErosionRow {
 };
 
 inline constexpr std::int32_t kErosionPoints = 9;
+
+/// A reach of a river, see generator/landscape/river_graph.h; columns.
+inline constexpr std::int32_t kReachSegments = 4;
+
+struct ReachShape {
+    float x = 0;  ///< its node, whole columns from the places' origin
+    float z = 0;
+    float px[kReachSegments + 1] = {};  ///< from the node
+    float pz[kReachSegments + 1] = {};
+    float inverse_square[kReachSegments] = {};  ///< 1 / length^2 of each piece, or 0
+    float level = 0;
+    float level_change = 0;
+};
+
+/// kVectorPad places and what valleys are made with, see generator/landscape/relief.h.
+struct ValleyPlaces {
+    float x[kVectorPad];  ///< whole columns from an origin
+    float z[kVectorPad];
+    float x_rest[kVectorPad];  ///< of a column
+    float z_rest[kVectorPad];
+    float river[kVectorPad];   ///< results: hr, where weight is not 0
+    float crest[kVectorPad];   ///< pf
+    float weight[kVectorPad];  ///< sum w
+};
+
+struct ValleyConstants {
+    float inverse_reach_square = 0;  ///< 1 / R^2
+    float e2 = 0;
+    float half_valley = 0;
+    float plateau = 0;
+};
 
 struct RowKernels {
     /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
@@ -128,6 +167,10 @@ struct RowKernels {
                          const SegmentTable& segments, float inverse_half_side, float thick);
     /// Stripes down the slopes of a row, and what they make of its slopes.
     void (*erode)(const ErosionRow& row);
+    /// Level and crest of the places from all reaches that come nearer than R to any of them, in
+    /// order.
+    void (*valleys)(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count,
+                    const ValleyConstants& constants);
 };
 
 namespace kernels_scalar {
