@@ -13,6 +13,7 @@
 
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
+#include "generator/mesh/water_surface.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
@@ -152,7 +153,11 @@ void add_rectangle(Mesh& out, const Direction& direction, std::int32_t plane256,
 struct BlockyMesher::Buffers {
     using Columns = std::array<Word, static_cast<std::size_t>(kChunkSideMax) * kChunkSideMax>;
 
+    explicit Buffers(const WorldDefinition& definition)
+        : material_shades(material_shades_of(definition)), water(definition) {}
+
     std::vector<Shade> material_shades;
+    WaterSurface water;
     std::vector<std::uint8_t> palette_materials;
     SolidColumns columns;
     std::size_t side = 0;
@@ -166,6 +171,8 @@ struct BlockyMesher::Buffers {
 
     std::vector<std::uint8_t> has_faces;  ///< by band: 0 where all is solid
 
+    /// Appends the faces of the ground to `out`, which is empty.
+    void mesh_solid(Mesh& out, const Stack& stack, HeightRange heights);
     void start(const Stack& stack);
     void find_bands(std::int32_t first_layer, std::int32_t layer_count);
     void fill_solid();
@@ -335,9 +342,7 @@ void BlockyMesher::Buffers::mesh_layers(Mesh& out, std::size_t direction, std::i
 }
 
 BlockyMesher::BlockyMesher(const WorldDefinition& definition)
-    : buffers_(std::make_unique<Buffers>()) {
-    buffers_->material_shades = material_shades_of(definition);
-}
+    : buffers_(std::make_unique<Buffers>(definition)) {}
 
 BlockyMesher::~BlockyMesher() = default;
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
@@ -352,36 +357,40 @@ void BlockyMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights) {
     TERRANE_ASSERT(heights.first <= heights.last &&
                    heights.last - heights.first <= kRangeVoxelsMax);
     TERRANE_ASSERT(stack.side <= kChunkSideMax);
-    Buffers& b = *buffers_;
     out.clear();
-    find_solid_columns(b.columns, stack);
+    buffers_->mesh_solid(out, stack, heights);
+    buffers_->water.append(out, stack, heights);
+}
+
+void BlockyMesher::Buffers::mesh_solid(Mesh& out, const Stack& stack, HeightRange heights) {
+    find_solid_columns(columns, stack);
     // From the highest layer that is solid in all columns to the highest that is in any.
-    const std::int64_t first =
-        std::max<std::int64_t>(owned_from(heights.first), voxels_under(b.columns.lowest256) - 1);
-    const std::int64_t last =
-        std::min<std::int64_t>(owned_from(heights.last), voxels_under(b.columns.highest256));
-    if (first >= last) {
+    const std::int64_t begin =
+        std::max<std::int64_t>(owned_from(heights.first), voxels_under(columns.lowest256) - 1);
+    const std::int64_t end =
+        std::min<std::int64_t>(owned_from(heights.last), voxels_under(columns.highest256));
+    if (begin >= end) {
         return;
     }
-    b.start(stack);
-    const auto layer_count = static_cast<std::int32_t>(last - first);
-    b.find_bands(static_cast<std::int32_t>(first), layer_count);
+    start(stack);
+    const auto layer_count = static_cast<std::int32_t>(end - begin);
+    find_bands(static_cast<std::int32_t>(begin), layer_count);
     for (std::int32_t layer = 0; layer < layer_count; layer += kBandVoxels) {
-        if (b.has_faces[static_cast<std::size_t>(layer / kBandVoxels)] == 0) {
+        if (has_faces[static_cast<std::size_t>(layer / kBandVoxels)] == 0) {
             continue;
         }
-        b.first = static_cast<std::int32_t>(first) + layer;
-        b.fill_solid();
-        if (b.find_faces(std::min(layer_count - layer, kBandVoxels)) == 0) {
+        first = static_cast<std::int32_t>(begin) + layer;
+        fill_solid();
+        if (find_faces(std::min(layer_count - layer, kBandVoxels)) == 0) {
             continue;
         }
-        b.find_materials(stack);
-        const auto y256 = static_cast<std::int32_t>((b.first - 1 - heights.first) * kUnitsPerVoxel);
+        find_materials(stack);
+        const auto y256 = static_cast<std::int32_t>((first - 1 - heights.first) * kUnitsPerVoxel);
         for (std::size_t direction = 0; direction < kDirections.size(); ++direction) {
             if (kDirections[direction].axis == kY) {
-                b.mesh_layers(out, direction, y256);
+                mesh_layers(out, direction, y256);
             } else {
-                b.mesh_sides(out, direction, y256);
+                mesh_sides(out, direction, y256);
             }
         }
     }

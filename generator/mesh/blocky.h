@@ -28,7 +28,8 @@ class BlockyMesher {
     /// height) of the stack's own N x N columns: over all chunks every face is there once. What
     /// lies under y = 0 is solid ground; its tops at y = 0, where a column begins hollow, belong to
     /// the chunk y = 0, so chunks below have none. Four vertices a rectangle, on whole voxels from
-    /// 0 to N and 0 to `height`, with a flat normal and the material's own colour.
+    /// 0 to N and 0 to `height`, with a flat normal and the material's own colour. Water has the
+    /// surface that the smooth style gives it.
     void mesh(Mesh& out, const Stack& stack, std::int32_t y, std::int32_t height);
 
     /// The same for any range of heights, positions being relative to heights.first. Needs:

@@ -74,6 +74,13 @@ int fill(draco::Mesh& out, const Mesh& mesh) {
     const auto materials =
         add_attribute<std::uint8_t>(out, Attribute::GENERIC, 1, draco::DT_UINT8, false).second;
     std::memcpy(materials, mesh.material_ids.data(), vertices);
+    const bool has_parts = std::any_of(mesh.parts.begin(), mesh.parts.end(),
+                                       [](MeshPart part) { return part != MeshPart::ground; });
+    if (has_parts) {  // after the materials: the second of its type
+        const auto parts =
+            add_attribute<std::uint8_t>(out, Attribute::GENERIC, 1, draco::DT_UINT8, false).second;
+        std::memcpy(parts, mesh.parts.data(), vertices);
+    }
 
     out.SetNumFaces(mesh.triangle_count());
     for (std::uint32_t i = 0; i < mesh.triangle_count(); ++i) {
@@ -141,11 +148,13 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     return {};
 }
 
-/// The one attribute of a type, if it is as encode_draco writes it.
+/// The first attribute of a type, or another, if it is as encode_draco writes it.
 const draco::PointAttribute* attribute_of(const draco::Mesh& mesh,
                                           draco::GeometryAttribute::Type type,
-                                          draco::DataType data_type, int components) {
-    const draco::PointAttribute* const found = mesh.GetNamedAttribute(type);
+                                          draco::DataType data_type, int components,
+                                          int which = 0) {
+    const draco::PointAttribute* const found =
+        mesh.NumNamedAttributes(type) > which ? mesh.GetNamedAttribute(type, which) : nullptr;
     return found != nullptr && found->data_type() == data_type &&
                    found->num_components() == components
                ? found
@@ -180,6 +189,7 @@ Result<Mesh> converted(const draco::Mesh& in) {
     const auto* const normals = attribute_of(in, Attribute::NORMAL, draco::DT_FLOAT32, 3);
     const auto* const colors = attribute_of(in, Attribute::COLOR, draco::DT_UINT8, 3);
     const auto* const materials = attribute_of(in, Attribute::GENERIC, draco::DT_UINT8, 1);
+    const auto* const parts = attribute_of(in, Attribute::GENERIC, draco::DT_UINT8, 1, 1);
     if (positions == nullptr || normals == nullptr || colors == nullptr || materials == nullptr) {
         return fail(ErrorCode::malformed, "draco: position, normal, colour or material is missing");
     }
@@ -189,12 +199,18 @@ Result<Mesh> converted(const draco::Mesh& in) {
     out.normals.resize(points);
     out.colors.resize(points);
     out.material_ids.resize(points);
+    out.parts.resize(parts != nullptr ? points : 0);
     for (std::uint32_t i = 0; i < points; ++i) {
         glm::vec3 voxels{};
         if (!read_value(voxels, *positions, i) || !to_position256(out.positions256[i], voxels) ||
             !read_value(out.normals[i], *normals, i) || !read_value(out.colors[i], *colors, i) ||
             !read_value(out.material_ids[i], *materials, i)) {
             return fail(ErrorCode::malformed, "draco: vertex " + std::to_string(i) + " is bad");
+        }
+        if (parts != nullptr &&
+            (!read_value(out.parts[i], *parts, i) || out.parts[i] > MeshPart::water)) {
+            return fail(ErrorCode::malformed,
+                        "draco: vertex " + std::to_string(i) + " is of no part that is known");
         }
     }
     out.indices.reserve(std::size_t{3} * in.num_faces());

@@ -17,7 +17,7 @@
 namespace terrane {
 
 /// Part of the encoding version: raised whenever a byte of a served mesh or chunk changes.
-inline constexpr std::uint32_t kEncodingVersion = 1;
+inline constexpr std::uint32_t kEncodingVersion = 2;
 
 inline constexpr std::int32_t kDracoStepsPerVoxel = 32;
 /// The largest input that decode_draco looks at; a chunk's mesh is a few kB to a few hundred.
@@ -41,7 +41,8 @@ int draco_position_bits(const DracoSettings& settings);
 
 /// Encodes a mesh of at least one triangle. Draco orders vertices and triangles anew; the same mesh
 /// gives the same bytes. Attributes: POSITION (float x 3, voxels), NORMAL (float x 3, 8 bits),
-/// COLOR (u8 x 3 normalised, linear), and GENERIC (u8 x 1): the material id. Fails with
+/// COLOR (u8 x 3 normalised, linear), GENERIC (u8 x 1): the material id, and, if anything is not
+/// ground, a second GENERIC (u8 x 1): the MeshPart. Fails with
 /// `invalid_argument` for an empty mesh, `out_of_range` for positions outside the settings' box.
 Result<Bytes> encode_draco(const Mesh& mesh, const DracoSettings& settings);
 

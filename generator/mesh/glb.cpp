@@ -87,13 +87,16 @@ GlbVertex vertex_of(const Mesh& mesh, std::size_t i, const std::array<float, 3>&
     return vertex;
 }
 
-/// Vertices are numbered by their first use in a triangle, so none is without one.
-GlbMesh merged(const Mesh& mesh, const DracoSettings& settings) {
+/// One part's triangles. Vertices are numbered by their first use in one, so none is without.
+GlbMesh merged(const Mesh& mesh, const DracoSettings& settings, MeshPart part) {
     const std::array<float, 3> centre = centre_of(settings);
     GlbMesh out;
     std::unordered_map<GlbVertex, std::uint32_t, GlbVertexHash> known;
     known.reserve(mesh.vertex_count());
     for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+        if (mesh.part_of_triangle(i / 3) != part) {
+            continue;
+        }
         std::array<GlbVertex, 3> corners;
         for (std::size_t corner = 0; corner < 3; ++corner) {
             corners[corner] = vertex_of(mesh, mesh.indices[i + corner], centre);
@@ -133,6 +136,9 @@ int add_attribute(draco::Mesh& out, std::span<const GlbVertex> vertices,
 }
 
 struct DracoPart {
+    MeshPart part = MeshPart::ground;
+    std::array<float, 3> least{};
+    std::array<float, 3> most{};
     Bytes bytes;
     std::size_t points = 0;
     std::size_t triangles = 0;
@@ -175,7 +181,18 @@ Result<DracoPart> draco_part(const GlbMesh& mesh, const DracoSettings& settings)
                                              " triangles: " + status.error_msg_string());
     }
     const auto encoded = std::as_bytes(std::span(buffer.data(), buffer.size()));
-    return DracoPart{.bytes = Bytes(encoded.begin(), encoded.end()),
+    std::array<float, 3> least = mesh.vertices.front().position;
+    std::array<float, 3> most = least;
+    for (const GlbVertex& vertex : mesh.vertices) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            least[axis] = std::min(least[axis], vertex.position[axis]);
+            most[axis] = std::max(most[axis], vertex.position[axis]);
+        }
+    }
+    return DracoPart{.part = MeshPart::ground,
+                     .least = least,
+                     .most = most,
+                     .bytes = Bytes(encoded.begin(), encoded.end()),
                      .points = encoder.num_encoded_points(),
                      .triangles = encoder.num_encoded_faces(),
                      .position_id = filled.attribute(position)->unique_id(),
@@ -201,46 +218,6 @@ std::string numbers(const std::array<T, 3>& values) {
     text += number(values[2]);
     text += ']';
     return text;
-}
-
-std::string json_of(const DracoPart& part, const GlbMesh& mesh, const DracoSettings& settings,
-                    const GlbPlace& place) {
-    std::array<float, 3> least = mesh.vertices.front().position;
-    std::array<float, 3> most = least;
-    for (const GlbVertex& vertex : mesh.vertices) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            least[axis] = std::min(least[axis], vertex.position[axis]);
-            most[axis] = std::max(most[axis], vertex.position[axis]);
-        }
-    }
-    const std::array<float, 3> centre = centre_of(settings);
-    Vector3 translation{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        translation[axis] =
-            place.corner_m[axis] + static_cast<double>(centre[axis]) * place.unit_m[axis];
-    }
-    const std::string count = number(part.points);
-    // componentType 5126 is float, 5121 u8, 5125 u32. Accessors have no bufferView: Draco has the
-    // values.
-    return R"({"asset":{"generator":"Terrane","version":"2.0"},)"
-           R"("extensionsUsed":["KHR_draco_mesh_compression"],)"
-           R"("extensionsRequired":["KHR_draco_mesh_compression"],)"
-           R"("scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":)" +
-           numbers(translation) + R"(,"scale":)" + numbers(place.unit_m) +
-           R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1,"COLOR_0":2},)"
-           R"("indices":3,"material":0,"extensions":{"KHR_draco_mesh_compression":)"
-           R"({"bufferView":0,"attributes":{"POSITION":)" +
-           number(part.position_id) + R"(,"NORMAL":)" + number(part.normal_id) + R"(,"COLOR_0":)" +
-           number(part.color_id) +
-           R"(}}}}]}],"materials":[{"pbrMetallicRoughness":{"metallicFactor":0,)"
-           R"("roughnessFactor":1}}],"accessors":[{"componentType":5126,"count":)" +
-           count + R"(,"type":"VEC3","min":)" + numbers(least) + R"(,"max":)" + numbers(most) +
-           R"(},{"componentType":5126,"count":)" + count +
-           R"(,"type":"VEC3"},{"componentType":5121,"normalized":true,"count":)" + count +
-           R"(,"type":"VEC4"},{"componentType":5125,"count":)" + number(3 * part.triangles) +
-           R"(,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":)" +
-           number(part.bytes.size()) + R"(}],"buffers":[{"byteLength":)" +
-           number(part.bytes.size()) + "}]}";
 }
 
 constexpr std::size_t padded4(std::size_t size_bytes) {
@@ -278,6 +255,96 @@ Bytes glb_of(std::string_view json, std::span<const std::byte> binary) {
     return out;
 }
 
+/// Ground and caves share a material; water is one that lets the bed shine through.
+constexpr std::string_view kMaterials =
+    R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1}})";
+constexpr std::string_view kWaterMaterial =
+    R"({"name":"water","alphaMode":"BLEND","pbrMetallicRoughness":{"metallicFactor":0,)"
+    R"("roughnessFactor":0.15,"baseColorFactor":[1,1,1,0.72]}})";
+
+std::string_view name_of(MeshPart part) {
+    return part == MeshPart::water ? "water" : part == MeshPart::cave ? "caves" : "ground";
+}
+
+/// What a scene's mesh has of one part: its primitive, its accessors, its place in the buffer.
+struct PartJson {
+    std::string primitive;
+    std::string accessors;
+    std::string buffer_view;
+};
+
+// componentType 5126 is float, 5121 u8, 5125 u32. Accessors have no bufferView: Draco has the
+// values.
+PartJson json_of(const DracoPart& part, std::size_t index, std::size_t offset_bytes,
+                 bool is_named) {
+    const std::string count = number(part.points);
+    const std::size_t first = 4 * index;
+    PartJson out;
+    out.primitive =
+        R"({"attributes":{"POSITION":)" + number(first) + R"(,"NORMAL":)" + number(first + 1) +
+        R"(,"COLOR_0":)" + number(first + 2) + R"(},"indices":)" + number(first + 3) +
+        R"(,"material":)" + (part.part == MeshPart::water && index > 0 ? "1" : "0") +
+        R"(,"extensions":{"KHR_draco_mesh_compression":{"bufferView":)" + number(index) +
+        R"(,"attributes":{"POSITION":)" + number(part.position_id) + R"(,"NORMAL":)" +
+        number(part.normal_id) + R"(,"COLOR_0":)" + number(part.color_id) + "}}}";
+    if (is_named) {
+        out.primitive += R"(,"extras":{"part":")";
+        out.primitive += name_of(part.part);
+        out.primitive += R"("})";
+    }
+    out.primitive += "}";
+    out.accessors = R"({"componentType":5126,"count":)" + count + R"(,"type":"VEC3","min":)" +
+                    numbers(part.least) + R"(,"max":)" + numbers(part.most) +
+                    R"(},{"componentType":5126,"count":)" + count +
+                    R"(,"type":"VEC3"},{"componentType":5121,"normalized":true,"count":)" + count +
+                    R"(,"type":"VEC4"},{"componentType":5125,"count":)" +
+                    number(3 * part.triangles) + R"(,"type":"SCALAR"})";
+    out.buffer_view = R"({"buffer":0,)";
+    if (offset_bytes > 0) {
+        out.buffer_view += R"("byteOffset":)" + number(offset_bytes) + ",";
+    }
+    out.buffer_view += R"("byteLength":)" + number(part.bytes.size()) + "}";
+    return out;
+}
+
+/// The whole file of these parts; at least one. A lone part of ground has no extras.
+Bytes glb_of_parts(std::span<const DracoPart> parts, const DracoSettings& settings,
+                   const GlbPlace& place) {
+    const std::array<float, 3> centre = centre_of(settings);
+    Vector3 translation{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        translation[axis] =
+            place.corner_m[axis] + static_cast<double>(centre[axis]) * place.unit_m[axis];
+    }
+    const bool is_named = parts.size() > 1 || parts.front().part != MeshPart::ground;
+    PartJson all;
+    Bytes binary;
+    std::string materials(kMaterials);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        binary.resize(padded4(binary.size()));
+        const PartJson one = json_of(parts[i], i, binary.size(), is_named);
+        const std::string comma = i > 0 ? "," : "";
+        all.primitive += comma + one.primitive;
+        all.accessors += comma + one.accessors;
+        all.buffer_view += comma + one.buffer_view;
+        binary.insert(binary.end(), parts[i].bytes.begin(), parts[i].bytes.end());
+        if (parts[i].part == MeshPart::water) {
+            materials =
+                i > 0 ? materials + "," + std::string(kWaterMaterial) : std::string(kWaterMaterial);
+        }
+    }
+    const std::string json =
+        R"({"asset":{"generator":"Terrane","version":"2.0"},)"
+        R"("extensionsUsed":["KHR_draco_mesh_compression"],)"
+        R"("extensionsRequired":["KHR_draco_mesh_compression"],)"
+        R"("scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":)" +
+        numbers(translation) + R"(,"scale":)" + numbers(place.unit_m) +
+        R"(}],"meshes":[{"primitives":[)" + all.primitive + R"(]}],"materials":[)" + materials +
+        R"(],"accessors":[)" + all.accessors + R"(],"bufferViews":[)" + all.buffer_view +
+        R"(],"buffers":[{"byteLength":)" + number(binary.size()) + "}]}";
+    return glb_of(json, binary);
+}
+
 /// A side of the tile: its plane, and the way in which an edge on it runs that has the solid below.
 struct Side {
     int axis = 0;
@@ -311,7 +378,7 @@ std::vector<Edge> open_side_edges(const Mesh& mesh, std::int32_t side256) {
     for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
         const std::uint32_t a = mesh.indices[i];
         const std::uint32_t b = mesh.indices[i % 3 == 2 ? i - 2 : i + 1];
-        if (is_on_side(a) && is_on_side(b)) {
+        if (is_on_side(a) && is_on_side(b) && mesh.part(a) != MeshPart::water) {
             edges.push_back({.a = a, .b = b});
             known.insert(name_of(a, b));
         }
@@ -338,15 +405,20 @@ Result<Bytes> encode_glb(const Mesh& mesh, const DracoSettings& settings, const 
                         std::to_string(settings.height_voxels) + " voxels");
     }
     try {
-        const GlbMesh vertices = merged(mesh, settings);
-        if (vertices.triangles.empty()) {
-            return empty_glb();
+        std::vector<DracoPart> parts;
+        for (const MeshPart which : {MeshPart::ground, MeshPart::cave, MeshPart::water}) {
+            const GlbMesh vertices = merged(mesh, settings, which);
+            if (vertices.triangles.empty()) {
+                continue;
+            }
+            auto part = draco_part(vertices, settings);
+            if (!part) {
+                return tl::unexpected(part.error());
+            }
+            part->part = which;
+            parts.push_back(*std::move(part));
         }
-        const auto part = draco_part(vertices, settings);
-        if (!part) {
-            return tl::unexpected(part.error());
-        }
-        return glb_of(json_of(*part, vertices, settings, place), part->bytes);
+        return parts.empty() ? empty_glb() : glb_of_parts(parts, settings, place);
     } catch (const std::exception& error) {
         return fail(ErrorCode::internal, std::string("glb: ") + error.what());
     }
@@ -375,6 +447,9 @@ void add_side_skirts(Mesh& mesh, std::int32_t side) {
             mesh.normals.push_back(glm::vec3(mesh.normals[vertex]));
             mesh.colors.push_back(glm::u8vec3(mesh.colors[vertex]));
             mesh.material_ids.push_back(std::uint8_t{mesh.material_ids[vertex]});
+            if (!mesh.parts.empty()) {
+                mesh.parts.push_back(MeshPart{mesh.parts[vertex]});
+            }
         }
         return place->second;
     };

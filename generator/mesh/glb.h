@@ -1,12 +1,15 @@
 // A mesh as a binary glTF 2.0 file (GLB) with Draco inside: what 3D Tiles and glTF viewers read.
 //
 //     "glTF" u32 | version u32 2 | bytes u32
-//     bytes u32 | "JSON" | one node that places one mesh of one primitive, padded with spaces
-//     bytes u32 | "BIN\0" | the Draco mesh, padded with zeros
+//     bytes u32 | "JSON" | one node that places one mesh, padded with spaces
+//     bytes u32 | "BIN\0" | a Draco mesh for each primitive, padded with zeros
 //
 // Vertices are relative to the centre of the mesh's box, in columns of the level for x and z and in
 // voxels for y; the node's scale makes metres of them and its translation puts the centre where it
 // is in the world, in doubles. glTF is y up as the world is, so axes stay as they are.
+//
+// A mesh has a primitive for each part that it has: ground, caves, water. `extras.part` names them
+// ("ground", "caves", "water") unless ground is all there is; water's material is translucent.
 //
 // Positions are quantised as in draco_codec.h, in steps of 1/32 from a fixed corner of the box with
 // as many bits for every tile of a level: what two tiles share is the same point in both.

@@ -68,7 +68,7 @@ void add_skirt(Mesh& mesh, std::uint32_t first, std::int64_t stride, std::int32_
 }  // namespace
 
 HeightFieldMesher::HeightFieldMesher(const WorldDefinition& definition)
-    : material_colors_(linear_colors_of(definition)) {}
+    : material_colors_(linear_colors_of(definition)), water_(definition) {}
 
 void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
     TERRANE_ASSERT(stack.position.lod >= 1);
@@ -100,15 +100,15 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
             add_cell(out, z * stride + x, stride);
         }
     }
-    if (!with_skirts) {
-        return;
+    if (with_skirts) {
+        const std::int64_t depth256 = std::int64_t{kSkirtCells * kColumn256} << stack.position.lod;
+        const std::uint32_t last = stride * stride - 1;
+        add_skirt(out, side, -1, vertices, depth256);                                  // z = 0
+        add_skirt(out, last - side, 1, vertices, depth256);                            // z = N
+        add_skirt(out, 0, stride, vertices, depth256);                                 // x = 0
+        add_skirt(out, last, -static_cast<std::int64_t>(stride), vertices, depth256);  // x = N
     }
-    const std::int64_t depth256 = std::int64_t{kSkirtCells * kColumn256} << stack.position.lod;
-    const std::uint32_t last = stride * stride - 1;
-    add_skirt(out, side, -1, vertices, depth256);                                  // z = 0
-    add_skirt(out, last - side, 1, vertices, depth256);                            // z = N
-    add_skirt(out, 0, stride, vertices, depth256);                                 // x = 0
-    add_skirt(out, last, -static_cast<std::int64_t>(stride), vertices, depth256);  // x = N
+    water_.append_coarse(out, stack);
 }
 
 }  // namespace terrane

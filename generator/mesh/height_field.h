@@ -5,11 +5,12 @@
 // level, y in voxels, at every level: scale x and z by 2^lod to get voxels.
 //
 // Where tiles of different levels meet, their edges follow different columns; skirts hang from the
-// four sides so that no hole can be seen between them.
+// four sides so that no hole can be seen between them. Open water has its own surface over its bed.
 #pragma once
 
 #include "generator/mesh/mesh.h"
 #include "generator/mesh/shade.h"
+#include "generator/mesh/water_surface.h"
 #include "generator/volume/stack.h"
 #include "generator/world/world_definition.h"
 
@@ -35,6 +36,7 @@ class HeightFieldMesher {
     std::vector<LinearColor> material_colors_;
     std::vector<PaletteShade> shades_;
     std::vector<std::int32_t> tops256_;
+    WaterSurface water_;
 };
 
 }  // namespace terrane

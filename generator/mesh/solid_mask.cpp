@@ -131,6 +131,26 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
     fill_planes(out);
 }
 
+void find_covered(std::vector<std::int32_t>& out, const SolidColumns& columns,
+                  std::int32_t roof256) {
+    out.resize(columns.column_count());
+    std::transform(columns.top256.begin(), columns.top256.end(), out.begin(),
+                   [roof256](std::int32_t top256) { return top256 - roof256; });
+    const SolidEnd* ends = columns.many_ends.data();
+    for (std::size_t i = 0; i < columns.many.size(); i += 2) {
+        const std::size_t count = columns.many[i + 1];
+        std::int32_t missing256 = roof256;
+        // The tops are ends 0, 2 and so on; the lowest solid has no bottom.
+        std::size_t top = count - 1;
+        while (top > 0 && ends[top].y256 - ends[top - 1].y256 < missing256) {
+            missing256 -= ends[top].y256 - ends[top - 1].y256;
+            top -= 2;
+        }
+        out[columns.many[i]] = ends[top].y256 - missing256;
+        ends += count;
+    }
+}
+
 void fill_solid_mask(SolidMask& out, const SolidColumns& columns) {
     out.width = columns.width;
     out.bits.resize(columns.column_count() * out.words());

@@ -76,6 +76,11 @@ struct SolidColumns {
 /// Overwrites `out`; allocates only while its buffers grow. Needs: columns of at least one limit.
 void find_solid_columns(SolidColumns& out, const Stack& stack);
 
+/// Overwrites `out` with one height a column: under it there is at least `roof256` of solid
+/// overhead.
+void find_covered(std::vector<std::int32_t>& out, const SolidColumns& columns,
+                  std::int32_t roof256);
+
 /// Bits of lattice points: bit b of word w of a column is point word_y[w] + b. Rows lie as
 /// [z][word][x], so that a step along x is a step in memory.
 struct SolidMask {

@@ -16,6 +16,7 @@
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
 #include "generator/mesh/surface_cells.h"
+#include "generator/mesh/water_surface.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
@@ -52,6 +53,12 @@ Corner solid_end_of_level_edge(const CellCorners& corners) {
 }  // namespace
 
 struct SurfaceNetsMesher::Buffers {
+    explicit Buffers(const WorldDefinition& definition)
+        : has_parts(definition.has_landscape()), water(definition) {}
+
+    bool has_parts;
+    WaterSurface water;
+    std::vector<std::int32_t> covered256;
     std::vector<LinearColor> material_colors;
     std::vector<PaletteShade> shades;
     SolidColumns columns;
@@ -106,9 +113,19 @@ class VertexMaker {
         Shade shade;
     };
 
+    /// `covered256` is find_covered's, or empty if nobody asks for parts.
     VertexMaker(const Stack& stack, const SolidColumns& columns,
-                std::span<const PaletteShade> shades)
-        : stack_(stack), columns_(columns), shades_(shades) {}
+                std::span<const PaletteShade> shades, std::span<const std::int32_t> covered256)
+        : stack_(stack), columns_(columns), shades_(shades), covered256_(covered256) {}
+
+    bool has_parts() const { return !covered256_.empty(); }
+
+    /// What the cell's vertex is of: a cave's if all four columns have enough rock above the cell.
+    MeshPart part_at(std::size_t index, std::int32_t floor256) const {
+        const Lanes is_open =
+            lanes_of(covered256_.data(), index) < floor256 + std::int32_t{kUnitsPerVoxel};
+        return bits_of(is_open) == 0 ? MeshPart::cave : MeshPart::ground;
+    }
 
     /// The vertex of the cell over column `index`, its next in x, and those next in z.
     Vertex at(std::size_t index, std::int32_t floor256) const {
@@ -178,6 +195,7 @@ class VertexMaker {
     const Stack& stack_;
     const SolidColumns& columns_;
     std::span<const PaletteShade> shades_;
+    std::span<const std::int32_t> covered256_;
 };
 
 /// Where the cells of a row or of a slice stand along one axis: column i stands at i - 1 + 1/2, and
@@ -224,6 +242,9 @@ void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexM
                 out.normals[at] = {vertex.normal[0], vertex.normal[1], vertex.normal[2]};
                 out.colors[at] = {shade.r, shade.g, shade.b};
                 out.material_ids[at] = shade.material;
+                if (maker.has_parts()) {
+                    out.parts[at] = maker.part_at(z * width + x, floor256);
+                }
             }
         }
     }
@@ -313,7 +334,7 @@ void find_triangles(Mesh& out, const std::vector<PackedPosition>& packed, const 
 }  // namespace
 
 SurfaceNetsMesher::SurfaceNetsMesher(const WorldDefinition& definition)
-    : buffers_(std::make_unique<Buffers>()) {
+    : buffers_(std::make_unique<Buffers>(definition)) {
     buffers_->material_colors = linear_colors_of(definition);
 }
 
@@ -334,6 +355,7 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     const Window window = window_of(b.columns, heights);
     if (window.is_empty()) {
         out.clear();
+        b.water.append(out, stack, heights);
         return;
     }
     find_words(b.solid.word_y, b.columns, window);
@@ -341,16 +363,22 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     find_edges(b.edges, b.solid, window);
     find_cells(b.cells, b.edges, b.solid);
     find_palette_shades(b.shades, stack.palette, b.material_colors);
+    if (b.has_parts) {
+        find_covered(b.covered256, b.columns, kCaveRoofVoxels * kUnitsPerVoxel);
+    }
 
     const std::size_t vertices = b.cells.vertex_count;
     out.positions256.resize(vertices);
     out.normals.resize(vertices);
     out.colors.resize(vertices);
     out.material_ids.resize(vertices);
+    out.parts.resize(b.has_parts ? vertices : 0);
     out.indices.resize(6 * count_edges(b.edges));
     b.packed.resize(vertices);
-    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades), b.cells, b.solid, window);
+    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades, b.covered256), b.cells,
+                  b.solid, window);
     find_triangles(out, b.packed, b.solid, b.edges, b.cells);
+    b.water.append(out, stack, heights);
 }
 
 }  // namespace terrane

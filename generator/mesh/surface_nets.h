@@ -2,6 +2,7 @@
 #pragma once
 
 #include "generator/mesh/mesh.h"
+#include "generator/mesh/water_surface.h"
 #include "generator/volume/stack.h"
 #include "generator/world/world_definition.h"
 
@@ -9,14 +10,6 @@
 #include <memory>
 
 namespace terrane {
-
-/// Heights first <= y < last, in voxels.
-struct HeightRange {
-    std::int64_t first = 0;
-    std::int64_t last = 0;
-
-    friend bool operator==(const HeightRange&, const HeightRange&) = default;
-};
 
 /// One worker's mesher and its buffers. Belongs to one thread at a time; its contents never change
 /// results. Once the buffers have grown to the largest stack seen, nothing is allocated.

@@ -1,5 +1,6 @@
 #include "server/report/write_report.h"
 
+#include "server/report/beyond.h"
 #include "server/report/complexity.h"
 #include "server/report/figures.h"
 #include "server/report/metrics.h"
@@ -27,6 +28,10 @@ Result<Page> make_report(const ReportOptions& options,
     }
     say("slices and pictures");
     if (auto done = write_figures(page, options); !done) {
+        return tl::unexpected(done.error());
+    }
+    say("beyond the paper");
+    if (auto done = write_beyond(page, options); !done) {
         return tl::unexpected(done.error());
     }
     return page;

@@ -8,11 +8,33 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
 namespace terrane {
 namespace {
+
+/// The mesh without the water's surface, which ends at its banks.
+Mesh without_water(const Mesh& mesh) {
+    Mesh out = mesh;
+    out.indices.clear();
+    for (std::size_t i = 0; i < mesh.triangle_count(); ++i) {
+        if (mesh.part_of_triangle(i) != MeshPart::water) {
+            const auto corner = mesh.indices.begin() + static_cast<std::ptrdiff_t>(3 * i);
+            out.indices.insert(out.indices.end(), corner, corner + 3);
+        }
+    }
+    // Water's vertices come last.
+    const auto dry = static_cast<std::size_t>(
+        std::find(out.parts.begin(), out.parts.end(), MeshPart::water) - out.parts.begin());
+    out.positions256.resize(dry);
+    out.normals.resize(dry);
+    out.colors.resize(dry);
+    out.material_ids.resize(dry);
+    out.parts.resize(dry);
+    return out;
+}
 
 class LandscapeStacks : public testing::TestWithParam<const char*> {};
 
@@ -40,7 +62,7 @@ TEST_P(LandscapeStacks, MeshWithoutCracksAndKeepTheirBytes) {
             for (std::int32_t y = -1; (y - 1) * height * kUnitsPerVoxel <= stack.highest_y256;
                  ++y) {
                 mesher.mesh(mesh, stack, y, height);
-                audit.add(mesh, {.lod = 0, .x = x, .y = y, .z = z});
+                audit.add(without_water(mesh), {.lod = 0, .x = x, .y = y, .z = z});
             }
         }
     }

@@ -158,9 +158,9 @@ TEST(Report, SpeedTableHasWhatThePaperCounts) {
 TEST(Report, IsOneWholePageWithChartsTablesAndPictures) {
     const Page page = make_report(tiny(), [](const std::string&) {}).value();
     const std::string html = page.html();
-    EXPECT_EQ(page.pictures().size(), 8U);
-    EXPECT_EQ(count_of(html, "data:image/png;base64,"), 8U);
-    EXPECT_GE(count_of(html, "<svg"), 26U);
+    EXPECT_EQ(page.pictures().size(), 13U);
+    EXPECT_EQ(count_of(html, "data:image/png;base64,"), 13U);
+    EXPECT_GE(count_of(html, "<svg"), 28U);
     EXPECT_EQ(count_of(html, "<svg"), count_of(html, "</svg>"));
     // Nothing from outside. A colon cannot come from the pictures' base64.
     EXPECT_EQ(count_of(html, "http:") + count_of(html, "https:") + count_of(html, "url("), 0U);
@@ -171,6 +171,8 @@ TEST(Report, IsOneWholePageWithChartsTablesAndPictures) {
         EXPECT_GT(count_of(svg, "<circle") + count_of(svg, "<rect"), 2U) << svg.substr(0, 400);
         EXPECT_EQ(count_of(svg, "nan") + count_of(svg, "inf"), 0U) << svg.substr(0, 400);
     }
+    EXPECT_THAT(html, HasSubstr("Beyond the paper"));
+    EXPECT_THAT(page.csv(), HasSubstr("landscape-water,canyon,of them uphill,0"));
     // Four fields a line, and the paper's own numbers among them.
     EXPECT_THAT(page.csv(), HasSubstr("table-3,A0,\"offline, paper\",319.1 (41.9)"));
     std::istringstream lines(page.csv());
