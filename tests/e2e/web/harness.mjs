@@ -14,7 +14,7 @@ const shots = join(root, 'build/e2e-web/screenshots');
 mkdirSync(shots, { recursive: true });
 
 /** A machine that builds something else meanwhile is given this long for anything. */
-const PATIENCE_MS = 90_000;
+const PATIENCE_MS = Number(process.env.TERRANE_PATIENCE_MS ?? 90_000);
 
 if (!existsSync(terrane)) {
     throw new Error(`${terrane} is not built; name it in TERRANE_BIN`);

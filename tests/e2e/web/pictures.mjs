@@ -1,10 +1,10 @@
-// Takes the pictures of client-sample/web: node pictures.mjs OUT
+// Takes the pictures of client-sample/web, or those that are named: node pictures.mjs OUT [NAME]...
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
 
 import { openViewer, settle, startBrowser, startServer, until } from './harness.mjs';
 
-const out = process.argv[2];
+const [, , out, ...names] = process.argv;
 mkdirSync(out, { recursive: true });
 
 const PICTURES = [
@@ -16,9 +16,9 @@ const PICTURES = [
 const server = await startServer();
 const browser = await startBrowser();
 try {
-    for (const { name, place, hour, act } of PICTURES) {
+    for (const { name, place, hour, act } of PICTURES.filter((one) => names.length === 0 || names.includes(one.name))) {
         const { page } = await openViewer(browser, server.port, {
-            query: `?quality=3&hour=${hour}`, place, width: 1280, height: 720,
+            query: `?quality=2&hour=${hour}`, place, width: 1280, height: 720,
         });
         await until(page, () => window.terrane?.world !== undefined && window.terrane.figures?.nearMissing === 0);
         await settle(page);

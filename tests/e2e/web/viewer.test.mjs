@@ -227,6 +227,21 @@ test('X-ray finds the veins and caves that are there', async () => {
         return caves + veins > 500;
     });
     await look(page, 'xray');
+    // What lies on the ground is kept as veins too, and would hide the real ones.
+    const cover = await page.evaluate(() => {
+        const { xray, hello } = window.terrane.world;
+        const meadow = hello.materials.findIndex(({ name }) => name === 'meadow');
+        let triangles = 0;
+        for (const mesh of [...xray.shown.values()].flatMap(({ meshes }) => meshes)) {
+            const { index, attributes } = mesh.geometry;
+            for (let i = 0; mesh.material === xray.veins && i < index.count; i += 3) {
+                const isMeadow = (corner) => attributes.tint.array[4 * index.array[i + corner] + 3] === meadow;
+                triangles += isMeadow(0) && isMeadow(1) && isMeadow(2) ? 1 : 0;
+            }
+        }
+        return triangles;
+    });
+    assert.equal(cover, 0, 'turf hides the veins');
     await page.keyboard.press('r');
     noFaults();
 });

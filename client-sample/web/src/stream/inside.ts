@@ -13,6 +13,7 @@ import {
     type TerraneClient,
 } from 'terrane-client';
 
+import type { Surface } from '../scene/surfaces';
 import type { DracoPool } from './draco_pool';
 import type { Comparison, Ground } from './messages';
 
@@ -39,6 +40,21 @@ export function groundOf(room: ColumnRoom, square: Square): Ground {
         starts[column + 1] = spans.length;
     }
     return { square, offsets: starts, spans: Float32Array.from(spans) };
+}
+
+/** The triangles that are no turf, loose soil or snow: worlds lay those over the ground as veins. */
+export function withoutCover(mesh: { materials: Uint8Array; indices: Uint32Array }, surfaces: Surface[]): Uint32Array {
+    const isCover = surfaces.map(([grass, soil, , snow]) => grass === 255 || soil === 255 || snow === 255);
+    const kept = new Uint32Array(mesh.indices.length);
+    let count = 0;
+    for (let i = 0; i < mesh.indices.length; i += 3) {
+        const corners = mesh.indices.subarray(i, i + 3);
+        if (corners.every((vertex) => !isCover[mesh.materials[vertex]!])) {
+            kept.set(corners, count);
+            count += 3;
+        }
+    }
+    return kept.slice(0, count);
 }
 
 /** The stacks of a level that a line runs over, those next to its middle first. */

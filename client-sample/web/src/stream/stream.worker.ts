@@ -13,7 +13,7 @@ import type { Surface } from '../scene/surfaces';
 import { ColumnLoads } from './column_loads';
 import { DracoPool } from './draco_pool';
 import { Meter } from './figures';
-import { compareFormats, groundOf, squaresAlong } from './inside';
+import { compareFormats, groundOf, squaresAlong, withoutCover } from './inside';
 import type { FromWorker, SectionImage, ToWorker, ViewState } from './messages';
 import { buffersOf, joinParts, surfacesOf } from './tile_mesh';
 import { TileStream } from './tile_stream';
@@ -167,9 +167,11 @@ function sendXray(square: Square): void {
     const { room, surfaces, client } = session;
     // The world's floor counts as solid for the mesher; what is asked for begins above it.
     const heights = { first: 1, last: Math.ceil(client.hello.heightBoundVoxels) + 1 };
-    const [caves, veins] = (['caves', 'veins'] as const).map((what) =>
-        joinParts([{ ...room.mesh(square, what, heights), y: heights.first }], surfaces),
-    );
+    const [caves, veins] = (['caves', 'veins'] as const).map((what) => {
+        const mesh = room.mesh(square, what, heights);
+        const indices = what === 'veins' ? withoutCover(mesh, surfaces) : mesh.indices;
+        return joinParts([{ ...mesh, indices, y: heights.first }], surfaces);
+    });
     post({ kind: 'xray', square, caves: caves!, veins: veins! }, [...buffersOf(caves!), ...buffersOf(veins!)]);
 }
 
