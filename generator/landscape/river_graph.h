@@ -106,6 +106,11 @@ class RiverGraph {
 
     void build(const RiverConstants& constants, const CellRange& range);
 
+    const Reach& reach(std::int64_t i, std::int64_t j) const {
+        return reaches_[static_cast<std::size_t>(
+            (j - range_.first_j) * (range_.last_i - range_.first_i + 1) + (i - range_.first_i))];
+    }
+
     /// By row, then along it.
     const std::vector<Reach>& reaches() const { return reaches_; }
 
