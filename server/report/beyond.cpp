@@ -298,13 +298,13 @@ struct Tables {
                    .series = {{.name = "reached from the sky", .values = {}, .deviations = {}},
                               {.name = "largest system", .values = {}, .deviations = {}}},
                    .log_y = false,
-                   .width = 560};
+                   .width = 440};
     BarChart cost{.title = "What a landscape costs",
                   .y_label = "times the same layers alone",
                   .groups = {},
                   .series = {{.name = "time of a stack", .values = {}, .deviations = {}}},
                   .log_y = false,
-                  .width = 560};
+                  .width = 440};
 };
 
 Result<void> measure(Tables& out, const char* name, const ReportOptions& options) {
