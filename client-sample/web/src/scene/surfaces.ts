@@ -2,10 +2,11 @@
 // names look like rock.
 import type { Material } from 'terrane-client';
 
-/** Shares of 255: grass, loose soil, gloss, snow. All 0: rock. */
+/** Shares of 255: grass, loose soil, gloss, snow. All 0: rock. Gloss and snow both whole: water. */
 export type Surface = [grass: number, soil: number, gloss: number, snow: number];
 
 const RULES: [RegExp, Surface][] = [
+    [/\b(water|sea|river|lake)\b/i, [0, 0, 255, 255]],
     [/\b(turf|grass|moss|meadow|lawn|prairie|heath|fern|leaf)/i, [255, 40, 0, 0]],
     [/\b(snow|ice|glacier|frost|firn)/i, [0, 0, 60, 255]],
     [/\b(soil|clay|loam|mud|peat|silt|dirt|humus|earth|sand|dune|gravel|ash|till|scree)\b/i, [0, 255, 0, 0]],

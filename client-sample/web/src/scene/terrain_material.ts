@@ -113,7 +113,8 @@ void main() {
     vec3 point = vWorld + uOriginPart;
     float grass = vSurface.x * smoothstep(0.45, 0.8, normal.y);
     float soil = vSurface.y;
-    float gloss = vSurface.z;
+    float water = step(0.9, min(vSurface.z, vSurface.w));
+    float gloss = vSurface.z * (1.0 - water);
     float rock = clamp(1.0 - vSurface.x - soil - vSurface.w, 0.0, 1.0);
 
     Ground near = groundAt(point, weight, 1.0 / 8.0);
@@ -146,8 +147,10 @@ void main() {
     float slope = smoothstep(0.86, 0.62, normal.y + (heights.r - 0.5) * 0.22);
     color = mix(color, mix(meadow, bare, slope * 0.8), vSurface.x);
 
+    color = mix(color, vColor * (0.5 + 0.25 * macro), water);
+
 #if DETAIL > 0
-    float bending = mix(1.25, 0.8, soil) * (1.0 - 0.45 * grass) * mix(0.2, 1.0, near_share);
+    float bending = mix(1.25, 0.8, soil) * (1.0 - 0.45 * grass) * mix(0.2, 1.0, near_share) * (1.0 - 0.9 * water);
     bend -= normal * dot(bend, normal);
     normal = normalize(normal - bend * bending * 1.5);
     float hollow = mix(1.0, smoothstep(-0.1, 0.55, relief), 0.65 * mix(0.3, 1.0, near_share));
@@ -168,6 +171,10 @@ void main() {
     float glint = gloss * (0.35 + 0.9 * smoothstep(0.55, 0.95, relief));
     shown += uSunColor * shine * mix(vec3(0.035), color * 1.5 + 0.08, gloss) * (0.25 + glint);
     shown += gloss * skyColor(reflect(-eye, normal)) * color * 0.22;
+    // Water mirrors the sky, more so the flatter one looks at it.
+    float mirror = water * (0.04 + 0.96 * pow(1.0 - max(dot(eye, normal), 0.0), 5.0));
+    shown = mix(shown, skyColor(reflect(-eye, normal)), mirror);
+    shown += water * uSunColor * shadow * pow(max(dot(normal, halfway), 0.0), 160.0);
     // Blades of grass let light through from behind.
     shown += grass * uSunColor * shadow * color * 0.10 * pow(max(dot(-eye, uSunDirection), 0.0), 3.0);
 
