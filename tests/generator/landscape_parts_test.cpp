@@ -252,7 +252,8 @@ TEST_P(LandscapeParts, GoThroughDracoAndAreAGlbsPrimitives) {
                       part == "water");
             const std::size_t view =
                 primitive["extensions"]["KHR_draco_mesh_compression"]["bufferView"];
-            const std::size_t offset = json["bufferViews"][view].value("byteOffset", 0);
+            const std::size_t offset =
+                json["bufferViews"][view].value("byteOffset", std::size_t{0});
             EXPECT_EQ(binary.substr(offset, 5), "DRACO");
         }
     });
@@ -280,7 +281,8 @@ TEST(LandscapePartsFromAfar, TheSeaHasItsLevelAtCoarseLevels) {
             for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
                 const bool is_water = mesh.part(v) == MeshPart::water;
                 water += is_water ? 1 : 0;
-                at_sea += is_water && mesh.positions256[v].y == static_cast<int>(sea * 256) ? 1 : 0;
+                at_sea +=
+                    is_water && mesh.positions256[v].y == static_cast<int>(sea * 256) ? 1U : 0U;
             }
         }
         EXPECT_GT(at_sea, 100U) << lod;
