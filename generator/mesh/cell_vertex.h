@@ -231,8 +231,9 @@ inline PackedPosition packed_position(Lanes position) {
 inline bool is_first_shorter(PackedPosition a, PackedPosition b, PackedPosition c,
                              PackedPosition d) {
     using Pair = std::uint64_t __attribute__((vector_size(16)));
-    const HalfLanes apart =
-        std::bit_cast<HalfLanes>(Pair{a, c}) - std::bit_cast<HalfLanes>(Pair{b, d});
+    using Wrapping = std::uint16_t __attribute__((vector_size(16)));
+    const auto apart = std::bit_cast<HalfLanes>(std::bit_cast<Wrapping>(Pair{a, c}) -
+                                                std::bit_cast<Wrapping>(Pair{b, d}));
     const Lanes squares = paired(apart, apart);
     return squares[0] + squares[1] <= squares[2] + squares[3];
 }
