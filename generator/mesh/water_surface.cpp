@@ -204,14 +204,18 @@ void WaterSurface::add_strips(Mesh& out, const Stack& stack, std::int32_t x, std
     }
 }
 
+void WaterSurface::forget_corners(std::int32_t side) {
+    first_corner_.assign(static_cast<std::size_t>(side + 1) * static_cast<std::size_t>(side + 1),
+                         kNone);
+    corners_.clear();
+}
+
 void WaterSurface::append(Mesh& out, const Stack& stack, HeightRange heights) {
     if (!find_levels(stack)) {
         return;
     }
     const std::int32_t side = stack.side;
-    first_corner_.assign(static_cast<std::size_t>(side + 1) * static_cast<std::size_t>(side + 1),
-                         kNone);
-    corners_.clear();
+    forget_corners(side);
     const auto floor256 = static_cast<std::int32_t>(heights.first * kUnitsPerVoxel);
     for (std::int32_t z = 0; z < side; ++z) {
         for (std::int32_t x = 0; x < side; ++x) {
@@ -244,9 +248,7 @@ void WaterSurface::append_coarse(Mesh& out, const Stack& stack) {
         return;
     }
     const std::int32_t side = stack.side;
-    first_corner_.assign(static_cast<std::size_t>(side + 1) * static_cast<std::size_t>(side + 1),
-                         kNone);
-    corners_.clear();
+    forget_corners(side);
     // Open water stands under the sky: it is the column's highest.
     const auto open_level = [&](std::int32_t x, std::int32_t z) -> std::optional<std::int32_t> {
         const auto levels = levels_of(stack, x, z);

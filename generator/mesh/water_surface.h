@@ -35,7 +35,8 @@ class WaterSurface {
   public:
     explicit WaterSurface(const WorldDefinition& definition);
 
-    /// Appends the surfaces that lie in the heights, at -256 <= y <= 256 * (last - first).
+    /// Appends the surfaces that lie in the heights, at -256 <= y <= 256 * (last - first), in 1/256
+    /// voxel over heights.first.
     void append(Mesh& out, const Stack& stack, HeightRange heights);
 
     /// For a stack above level 0: the open water of all heights.
@@ -55,6 +56,7 @@ class WaterSurface {
                                             std::int32_t z) const;
     std::int32_t corner_height(const Stack& stack, std::int32_t x, std::int32_t z,
                                std::int32_t level256, HeightRange heights) const;
+    void forget_corners(std::int32_t side);
     std::uint32_t corner(Mesh& out, std::int32_t x, std::int32_t z, std::int32_t y256,
                          std::int32_t side);
     std::uint32_t add_vertex(Mesh& out, glm::i32vec3 position, glm::vec3 normal) const;
