@@ -67,8 +67,8 @@ class ByteWriter {
     Bytes& out_;
 };
 
-/// Reads from bytes that somebody else owns and keeps alive. Nothing is read past the end: every call
-/// gives nothing when the bytes are cut short, and then stays at the end. One thread.
+/// Reads from bytes that somebody else owns and keeps alive. Nothing is read past the end: every
+/// call gives nothing when the bytes are cut short, and then stays at the end. One thread.
 class ByteReader {
   public:
     explicit ByteReader(std::span<const std::byte> bytes) : rest_(bytes) {}

@@ -1,5 +1,6 @@
-// Coordinate spaces, one type each. Y is up. Crossing from one space to another is a named function,
-// and integers floor, never truncate, so that negative coordinates behave like positive ones.
+// Coordinate spaces, one type each. Y is up. Crossing from one space to another is a named
+// function, and integers floor, never truncate, so that negative coordinates behave like positive
+// ones.
 #pragma once
 
 #include <compare>

@@ -2,8 +2,8 @@
 #include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
-#include "server/render/png.h"
 #include "server/cli/program.h"
+#include "server/render/png.h"
 #include "server/render/render_picture.h"
 
 #include <CLI/CLI.hpp>

@@ -31,9 +31,9 @@ TEST(Bytes, VarintsAbove64BitsAreRefused) {
 }
 
 TEST(Bytes, ZigzagCoversTheExtremes) {
-    for (const std::int64_t value : {std::int64_t{0}, std::int64_t{-1}, std::int64_t{1},
-                                     std::numeric_limits<std::int64_t>::min(),
-                                     std::numeric_limits<std::int64_t>::max()}) {
+    for (const std::int64_t value :
+         {std::int64_t{0}, std::int64_t{-1}, std::int64_t{1},
+          std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
         EXPECT_EQ(unzigzag(zigzag(value)), value);
     }
     EXPECT_EQ(zigzag(-1), 1U);

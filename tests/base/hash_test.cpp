@@ -1,8 +1,8 @@
 #include "protocol/base/hash.h"
 
-#include <gtest/gtest.h>
-
 #include "protocol/base/bytes.h"
+
+#include <gtest/gtest.h>
 
 namespace terrane {
 namespace {
