@@ -1,20 +1,75 @@
 #include "generator/mesh/solid_mask.h"
 
+#include "generator/mesh/lanes.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace terrane {
 namespace {
 
-/// Appends the column's ends to `out`.
-void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits,
+/// Bit i is set if limit i of the four has a palette id of at least `least`.
+unsigned ids_from(const Limit* limits, std::int32_t least) {
+    static_assert(sizeof(Limit) == 12 && offsetof(Limit, palette_id) == 4);
+    using Halves = std::uint16_t __attribute__((vector_size(16)));
+    const auto sixteen = [limits](std::size_t at) {
+        Halves halves;
+        std::memcpy(&halves, reinterpret_cast<const char*>(limits) + at, sizeof halves);
+        return halves;
+    };
+    // The four ids lie in halves 2 of the first vector, 0 and 6 of the second, 4 of the third: none
+    // in another's way. So they come as limits 1, 0, 3, 2.
+    const Halves two = __builtin_shufflevector(sixteen(0), sixteen(16), 8, 1, 2, 3, 4, 5, 14, 7);
+    const Halves four = __builtin_shufflevector(two, sixteen(32), 0, 1, 2, 3, 12, 5, 6, 7);
+    const Lanes ids = std::bit_cast<Lanes>(four) & 0xffff;
+    const unsigned found = bits_of(ids >= least);
+    return (found & 5U) << 1U | (found & 10U) >> 1U;
+}
+
+/// Overwrites `out` with the numbers of the limits that show void or a cave, ascending, and
+/// UINT32_MAX behind them. Few do but a column's last one.
+void find_hollow_limits(std::vector<std::uint32_t>& out, std::span<const Limit> limits,
+                        std::span<const std::uint8_t> is_hollow) {
+    // What is below the first hollow id needs no second look: a world's layers come first.
+    const auto least = static_cast<std::int32_t>(
+        std::find(is_hollow.begin(), is_hollow.end(), std::uint8_t{1}) - is_hollow.begin());
+    out.resize(limits.size() + 1);
+    std::uint32_t* next = out.data();
+    const auto look_at = [&](std::size_t i) {
+        *next = static_cast<std::uint32_t>(i);
+        next += is_hollow[limits[i].palette_id];
+    };
+    std::size_t i = 0;
+    for (; i + 4 <= limits.size(); i += 4) {
+        for (unsigned bits = ids_from(&limits[i], least); bits != 0; bits &= bits - 1) {
+            look_at(i + static_cast<std::size_t>(std::countr_zero(bits)));
+        }
+    }
+    for (; i < limits.size(); ++i) {
+        look_at(i);
+    }
+    *next = UINT32_MAX;
+}
+
+/// Appends the ends of the column of limits begin..end-1 to `out`. `hollow` are the hollow limits
+/// from `begin` on: next to no other does anything end.
+void append_ends(std::vector<SolidEnd>& out, const Limits& limits, std::size_t begin,
+                 std::size_t end, const std::uint32_t* hollow,
                  std::span<const std::uint8_t> is_hollow) {
     bool is_solid = true;  // the ground
-    for (std::size_t i = 0; i < limits.size(); ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
+        if (is_solid) {
+            while (*hollow < i) {
+                ++hollow;
+            }
+            i = std::max<std::size_t>(i + 1, std::min<std::size_t>(*hollow, end)) - 1;
+        }
         const Limit& low = limits[i];
-        const bool is_last = i + 1 == limits.size();
+        const bool is_last = i + 1 == end;
         if (!is_last && low.y256 >= limits[i + 1].y256) {
             continue;  // no height between them
         }
@@ -23,7 +78,7 @@ void append_ends(std::vector<SolidEnd>& out, std::span<const Limit> limits,
         if (is_solid_above != is_solid) {
             // A top shows what is under it: the first limit at its height.
             std::size_t shown = i;
-            while (is_solid && shown > 0 && limits[shown - 1].y256 == low.y256) {
+            while (is_solid && shown > begin && limits[shown - 1].y256 == low.y256) {
                 --shown;
             }
             out.push_back({.y256 = low.y256, .palette_id = limits[shown].palette_id});
@@ -86,19 +141,11 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
     for (const PaletteEntry& entry : stack.palette) {
         out.is_hollow.push_back(entry.is_solid() ? 0 : 1);
     }
-    // Few limits are not solid but a column's last; they are listed without a jump for each.
-    out.hollow_limits.resize(grid.limits.size() + 1);
-    std::uint32_t* const hollow = out.hollow_limits.data();
-    std::size_t hollow_count = 0;
-    for (std::uint32_t i = 0; i < grid.limits.size(); ++i) {
-        hollow[hollow_count] = i;
-        hollow_count += out.is_hollow[grid.limits[i].palette_id];
-    }
-    hollow[hollow_count] = UINT32_MAX;
+    find_hollow_limits(out.hollow_limits, grid.limits, out.is_hollow);
 
     out.lowest_top256 = INT32_MAX;
     out.highest256 = INT32_MIN;
-    const std::uint32_t* next_hollow = hollow;
+    const std::uint32_t* next_hollow = out.hollow_limits.data();
     for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t begin = grid.offsets[i];
         const std::uint32_t end = grid.offsets[i + 1];
@@ -111,8 +158,7 @@ void find_solid_columns(SolidColumns& out, const Stack& stack) {
             *next_hollow == end - 1 && end - begin > 1 && last[-1].y256 == last->y256;
         if (!is_plain) {
             const std::size_t before = out.many_ends.size();
-            append_ends(out.many_ends, std::span(grid.limits).subspan(begin, end - begin),
-                        out.is_hollow);
+            append_ends(out.many_ends, grid.limits, begin, end, next_hollow, out.is_hollow);
             const std::size_t ends = out.many_ends.size() - before;
             out.many.push_back(static_cast<std::uint32_t>(i));
             out.many.push_back(static_cast<std::uint32_t>(ends));

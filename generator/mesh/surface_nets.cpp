@@ -12,7 +12,8 @@
 // needs it computes the same one.
 #include "generator/mesh/surface_nets.h"
 
-#include "generator/mesh/cell_vertex.h"
+#include "generator/mesh/kernels/mesh_kernels.h"
+#include "generator/mesh/lanes.h"
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
 #include "generator/mesh/surface_cells.h"
@@ -31,31 +32,52 @@ namespace {
 
 constexpr std::int64_t kRangeVoxelsMax = std::int64_t{1} << 22;
 
-/// A corner of a cell: which of its columns, and whether at the ceiling.
-struct Corner {
-    int lane = 0;
-    bool is_high = false;
-};
-
-/// The solid end of the first crossed level edge, in a fixed order. Needs: there is one.
-Corner solid_end_of_level_edge(const CellCorners& corners) {
+/// The solid end of the first crossed level edge, in a fixed order, by the cell's solid corners.
+/// Needs: there is one.
+int solid_end_of_level_edge(unsigned solid) {
     constexpr std::array<std::pair<int, int>, 4> kEdges = {{{0, 1}, {2, 3}, {0, 2}, {1, 3}}};
     for (const int level : {4, 0}) {
         for (const auto& [a, b] : kEdges) {
-            if (corners.solid[level + a] != corners.solid[level + b]) {
-                return {.lane = corners.solid[level + a] != 0 ? a : b, .is_high = level != 0};
+            const unsigned a_solid = solid >> (level + a) & 1U;
+            if (a_solid != (solid >> (level + b) & 1U)) {
+                return level + (a_solid != 0 ? a : b);
             }
         }
     }
     TERRANE_ASSERT(false);
 }
 
+/// Cells that wait to be made together.
+struct CellQueue {
+    struct Cell {
+        std::uint32_t at;  ///< its vertex's number
+        std::uint32_t x;
+        std::uint32_t z;
+        std::int32_t floor256;
+    };
+
+    std::vector<std::int32_t> ends256;  ///< as MeshKernels says
+    std::array<Cell, kCellBatch> cells;
+    std::size_t count = 0;
+
+    /// Needs: no cell waits.
+    void set_planes(std::size_t planes) { ends256.resize(planes * 4 * kCellBatch); }
+
+    std::int32_t planes() const {
+        return static_cast<std::int32_t>(ends256.size() / (4 * std::size_t{kCellBatch}));
+    }
+};
+
 }  // namespace
 
 struct SurfaceNetsMesher::Buffers {
-    explicit Buffers(const WorldDefinition& definition)
-        : has_parts(definition.has_landscape()), water(definition) {}
+    Buffers(const WorldDefinition& definition, const MeshKernels& mesh_kernels)
+        : kernels(mesh_kernels), has_parts(definition.has_landscape()), water(definition) {}
 
+    const MeshKernels& kernels;
+    CellQueue simple_cells;
+    CellQueue other_cells;
+    CellResults results{};
     bool has_parts;
     WaterSurface water;
     std::vector<std::int32_t> covered256;
@@ -105,99 +127,6 @@ class BitList {
     std::size_t count_ = 0;
 };
 
-/// Makes the vertices of one tile; only reads what it refers to.
-class VertexMaker {
-  public:
-    struct Vertex {
-        CellVertex vertex;
-        Shade shade;
-    };
-
-    /// `covered256` is find_covered's, or empty if nobody asks for parts.
-    VertexMaker(const Stack& stack, const SolidColumns& columns,
-                std::span<const PaletteShade> shades, std::span<const std::int32_t> covered256)
-        : stack_(stack), columns_(columns), shades_(shades), covered256_(covered256) {}
-
-    bool has_parts() const { return !covered256_.empty(); }
-
-    /// What the cell's vertex is of: a cave's if all four columns have enough rock above the cell.
-    MeshPart part_at(std::size_t index, std::int32_t floor256) const {
-        const Lanes is_open =
-            lanes_of(covered256_.data(), index) < floor256 + std::int32_t{kUnitsPerVoxel};
-        return bits_of(is_open) == 0 ? MeshPart::cave : MeshPart::ground;
-    }
-
-    /// The vertex of the cell over column `index`, its next in x, and those next in z.
-    Vertex at(std::size_t index, std::int32_t floor256) const {
-        // A comparison's lanes are the platform's own integers of that size: long on wasm32.
-        const Lanes is_under = lanes_of(columns_.simple_from256.data(), index) > floor256;
-        const bool is_open = bits_of(is_under) == 0;
-        const CellCorners corners =
-            is_open ? corners_of_one_end(lanes_of(columns_.top256.data(), index) - floor256)
-                    : corners_of_ends(columns_.plane_count, [&](std::size_t plane) {
-                          return lanes_of(columns_.plane256(plane), index) - floor256;
-                      });
-        const unsigned crossed = bits_of(crossed_upright(corners));
-        Vertex made{.vertex = cell_vertex(corners), .shade = {}};
-        if (crossed == 0) {
-            made.shade = of_cliff(corners, index, floor256);
-        } else {
-            const std::size_t first = column(index, std::countr_zero(crossed));
-            made.shade =
-                shades_[is_open ? columns_.top_id[first]
-                                : columns_.end(first, end_from(first, floor256)).palette_id]
-                    .shade;
-        }
-        return made;
-    }
-
-  private:
-    std::size_t column(std::size_t index, int lane) const {
-        const auto at = static_cast<std::size_t>(lane);
-        return index + (at & 1U) + (at >> 1U) * columns_.width;
-    }
-
-    Lanes lanes_of(const std::int32_t* values, std::size_t index) const {
-        const std::int32_t* const here = values + index;
-        const std::int32_t* const next_z = here + columns_.width;
-        return Lanes{here[0], here[1], next_z[0], next_z[1]};
-    }
-
-    /// The column's first end that is not below a height. Needs: there is one.
-    std::size_t end_from(std::size_t column, std::int32_t y256) const {
-        std::size_t i = 0;
-        while (columns_.end(column, i).y256 < y256) {
-            ++i;
-        }
-        return i;
-    }
-
-    /// What shows on a steep side. Layers lie over slopes like blankets, so within 4 voxels of an
-    /// end of its column (76 degrees) a side shows what that end does: a point of the lattice may
-    /// be deeper in the ground than a layer is thick. Only a higher wall shows what is inside.
-    Shade of_cliff(const CellCorners& corners, std::size_t index, std::int32_t floor256) const {
-        const Corner solid = solid_end_of_level_edge(corners);
-        const std::size_t at = column(index, solid.lane);
-        const std::int32_t y256 = floor256 + (solid.is_high ? kUnitsPerVoxel : 0);
-        if (corners.distance[solid.lane + (solid.is_high ? 4 : 0)] < kDistanceMax256) {
-            const std::size_t i = end_from(at, y256);
-            const SolidEnd above = columns_.end(at, i);
-            const bool is_under =
-                i == 0 || above.y256 - y256 <= y256 - columns_.end(at, i - 1).y256;
-            return shades_[is_under ? above.palette_id : columns_.end(at, i - 1).palette_id].shade;
-        }
-        const ColumnGrid& grid = stack_.columns;
-        return shade_at(std::span(grid.limits)
-                            .subspan(grid.offsets[at], grid.offsets[at + 1] - grid.offsets[at]),
-                        y256, stack_.palette, shades_);
-    }
-
-    const Stack& stack_;
-    const SolidColumns& columns_;
-    std::span<const PaletteShade> shades_;
-    std::span<const std::int32_t> covered256_;
-};
-
 /// Where the cells of a row or of a slice stand along one axis: column i stands at i - 1 + 1/2, and
 /// cells that straddle a side give their vertex to that side.
 struct CellPlaces {
@@ -214,12 +143,163 @@ struct CellPlaces {
     }
 };
 
-/// One vertex for every used cell, at its number; its position in `packed` too.
-void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexMaker& maker,
-                   const Cells& cells, const SolidMask& solid, const Window& window) {
+/// Makes the vertices of one tile, many at a time. Most cells see one end of each of their columns;
+/// the others all of them.
+class VertexMaker {
+  public:
+    struct Input {
+        const Stack& stack;
+        const SolidColumns& columns;
+        std::span<const PaletteShade> shades;
+        std::span<const std::int32_t> covered256;  ///< find_covered's, or empty: no parts
+        std::int32_t origin256;
+        const MeshKernels& kernels;
+        CellQueue& simple;
+        CellQueue& other;
+        CellResults& results;
+    };
+
+    VertexMaker(Mesh& out, std::vector<PackedPosition>& packed, const Input& in)
+        : in_(in), columns_(in.columns), places_(in.columns.width - 2), out_(out), packed_(packed) {
+        in_.simple.set_planes(1);
+        in_.other.set_planes(columns_.plane_count);
+    }
+
+    /// Vertex `at` is of the cell over column (x, z), its next in x, and those next in z.
+    void add(std::uint32_t at, std::uint32_t x, std::uint32_t z, std::int32_t floor256) {
+        const std::size_t index = z * columns_.width + x;
+        // A comparison's lanes are the platform's own integers of that size: long on wasm32.
+        const Lanes is_under = lanes_of(columns_.simple_from256.data(), index) > floor256;
+        const bool is_simple = bits_of(is_under) == 0;
+        CellQueue& queue = is_simple ? in_.simple : in_.other;
+        queue.cells[queue.count] = {.at = at, .x = x, .z = z, .floor256 = floor256};
+        std::int32_t* to = queue.ends256.data() + queue.count;
+        const std::int32_t* from = is_simple ? columns_.top256.data() : columns_.plane256(0);
+        for (std::int32_t plane = queue.planes(); plane > 0; --plane) {
+            const Lanes ends = lanes_of(from, index) - floor256;
+            for (int lane = 0; lane < 4; ++lane) {
+                to[lane * kCellBatch] = ends[lane];
+            }
+            to += std::ptrdiff_t{4} * kCellBatch;
+            from += columns_.column_count();
+        }
+        if (++queue.count == kCellBatch) {
+            make(queue);
+        }
+    }
+
+    /// To be called once after the last add().
+    void finish() {
+        make(in_.simple);
+        make(in_.other);
+    }
+
+  private:
+    using Cell = CellQueue::Cell;
+
+    std::size_t index_of(const Cell& cell) const { return cell.z * columns_.width + cell.x; }
+
+    std::size_t column(std::size_t index, int lane) const {
+        const auto at = static_cast<std::size_t>(lane);
+        return index + (at & 1U) + (at >> 1U) * columns_.width;
+    }
+
+    Lanes lanes_of(const std::int32_t* values, std::size_t index) const {
+        const std::int32_t* const here = values + index;
+        const std::int32_t* const next_z = here + columns_.width;
+        return Lanes{here[0], here[1], next_z[0], next_z[1]};
+    }
+
+    void make(CellQueue& queue) {
+        const auto blocks = static_cast<std::int32_t>(queue.count + kCellBlock - 1) / kCellBlock;
+        in_.kernels.cell_vertices(in_.results, queue.ends256.data(), queue.planes(),
+                                  blocks * kCellBlock);
+        const bool is_simple = &queue == &in_.simple;
+        for (std::size_t i = 0; i < queue.count; ++i) {
+            put(queue.cells[i], i, shade_of(queue.cells[i], i, is_simple));
+        }
+        queue.count = 0;
+    }
+
+    Shade shade_of(const Cell& cell, std::size_t i, bool is_simple) const {
+        const std::int32_t upright = in_.results.first_upright[i];
+        if (upright == 4) {
+            return of_cliff(cell, i);
+        }
+        const std::size_t first = column(index_of(cell), upright);
+        const std::uint16_t id =
+            is_simple ? columns_.top_id[first]
+                      : columns_.end(first, end_from(first, cell.floor256)).palette_id;
+        return in_.shades[id].shade;
+    }
+
+    void put(const Cell& cell, std::size_t i, Shade shade) {
+        const CellResults& made = in_.results;
+        const std::int32_t x =
+            places_.base256[cell.x] + (made.offset256[0][i] & places_.keeps[cell.x]);
+        const std::int32_t y = cell.floor256 - in_.origin256 + made.offset256[1][i];
+        const std::int32_t z =
+            places_.base256[cell.z] + (made.offset256[2][i] & places_.keeps[cell.z]);
+        const std::size_t at = cell.at;
+        packed_[at] = packed_position(x, y, z);
+        out_.positions256[at] = {x, y, z};
+        out_.normals[at] = {made.normal[0][i], made.normal[1][i], made.normal[2][i]};
+        out_.colors[at] = {shade.r, shade.g, shade.b};
+        out_.material_ids[at] = shade.material;
+        if (!in_.covered256.empty()) {
+            out_.parts[at] = part_at(index_of(cell), cell.floor256);
+        }
+    }
+
+    /// What the cell's vertex is of: a cave's if all four columns have enough rock above the cell.
+    MeshPart part_at(std::size_t index, std::int32_t floor256) const {
+        const Lanes is_open =
+            lanes_of(in_.covered256.data(), index) < floor256 + std::int32_t{kUnitsPerVoxel};
+        return bits_of(is_open) == 0 ? MeshPart::cave : MeshPart::ground;
+    }
+
+    /// The column's first end that is not below a height. Needs: there is one.
+    std::size_t end_from(std::size_t column, std::int32_t y256) const {
+        std::size_t i = 0;
+        while (columns_.end(column, i).y256 < y256) {
+            ++i;
+        }
+        return i;
+    }
+
+    /// What shows on a steep side. Layers lie over slopes like blankets, so within 4 voxels of an
+    /// end of its column (76 degrees) a side shows what that end does: a point of the lattice may
+    /// be deeper in the ground than a layer is thick. Only a higher wall shows what is inside.
+    Shade of_cliff(const Cell& cell, std::size_t i) const {
+        const int corner = solid_end_of_level_edge(static_cast<unsigned>(in_.results.solid[i]));
+        const std::size_t at = column(index_of(cell), corner % 4);
+        const std::int32_t y256 = cell.floor256 + corner / 4 * kUnitsPerVoxel;
+        if (in_.results.distance256[corner][i] < kDistanceMax256) {
+            const std::size_t above_at = end_from(at, y256);
+            const SolidEnd above = columns_.end(at, above_at);
+            const bool is_under =
+                above_at == 0 || above.y256 - y256 <= y256 - columns_.end(at, above_at - 1).y256;
+            return in_
+                .shades[is_under ? above.palette_id : columns_.end(at, above_at - 1).palette_id]
+                .shade;
+        }
+        const ColumnGrid& grid = in_.stack.columns;
+        return shade_at(std::span(grid.limits)
+                            .subspan(grid.offsets[at], grid.offsets[at + 1] - grid.offsets[at]),
+                        y256, in_.stack.palette, in_.shades);
+    }
+
+    Input in_;
+    const SolidColumns& columns_;
+    CellPlaces places_;
+    Mesh& out_;
+    std::vector<PackedPosition>& packed_;
+};
+
+/// One vertex for every used cell, at its number.
+void find_vertices(VertexMaker& maker, const Cells& cells, const SolidMask& solid) {
     const std::size_t width = cells.used.width;
     const std::size_t last = width - 2;
-    const CellPlaces places(last);
     BitList list;
     for (std::size_t z = 0; z <= last; ++z) {
         for (std::size_t word = 0; word < cells.used.words; ++word) {
@@ -227,27 +307,16 @@ void find_vertices(Mesh& out, std::vector<PackedPosition>& packed, const VertexM
             const std::uint32_t* const first_vertex =
                 cells.first_vertex.data() + (cells.used.row(z, word) - cells.used.bits.data());
             std::size_t x_before = width;
-            std::size_t at = 0;
+            std::uint32_t at = 0;
             for (const auto [x, bit] : list.places()) {
                 at = x == x_before ? at + 1 : first_vertex[x];
                 x_before = x;
-                const std::int32_t floor256 = (solid.word_y[word] + bit) * kUnitsPerVoxel;
-                const auto [vertex, shade] = maker.at(z * width + x, floor256);
-                const Lanes base = {places.base256[x], floor256 - window.origin256,
-                                    places.base256[z], 0};
-                const Lanes keeps = {places.keeps[x], -1, places.keeps[z], 0};
-                const Lanes position = base + (vertex.offset256 & keeps);
-                packed[at] = packed_position(position);
-                out.positions256[at] = {position[0], position[1], position[2]};
-                out.normals[at] = {vertex.normal[0], vertex.normal[1], vertex.normal[2]};
-                out.colors[at] = {shade.r, shade.g, shade.b};
-                out.material_ids[at] = shade.material;
-                if (maker.has_parts()) {
-                    out.parts[at] = maker.part_at(z * width + x, floor256);
-                }
+                maker.add(at, x, static_cast<std::uint32_t>(z),
+                          (solid.word_y[word] + bit) * kUnitsPerVoxel);
             }
         }
     }
+    maker.finish();
 }
 
 /// Writes two triangles a quad, split along the shorter diagonal.
@@ -334,7 +403,10 @@ void find_triangles(Mesh& out, const std::vector<PackedPosition>& packed, const 
 }  // namespace
 
 SurfaceNetsMesher::SurfaceNetsMesher(const WorldDefinition& definition)
-    : buffers_(std::make_unique<Buffers>(definition)) {
+    : SurfaceNetsMesher(definition, chosen_mesh_kernels()) {}
+
+SurfaceNetsMesher::SurfaceNetsMesher(const WorldDefinition& definition, const MeshKernels& kernels)
+    : buffers_(std::make_unique<Buffers>(definition, kernels)) {
     buffers_->material_colors = linear_colors_of(definition);
 }
 
@@ -375,8 +447,17 @@ void SurfaceNetsMesher::mesh(Mesh& out, const Stack& stack, HeightRange heights)
     out.parts.resize(b.has_parts ? vertices : 0);
     out.indices.resize(6 * count_edges(b.edges));
     b.packed.resize(vertices);
-    find_vertices(out, b.packed, VertexMaker(stack, b.columns, b.shades, b.covered256), b.cells,
-                  b.solid, window);
+    VertexMaker maker(out, b.packed,
+                      {.stack = stack,
+                       .columns = b.columns,
+                       .shades = b.shades,
+                       .covered256 = b.covered256,
+                       .origin256 = window.origin256,
+                       .kernels = b.kernels,
+                       .simple = b.simple_cells,
+                       .other = b.other_cells,
+                       .results = b.results});
+    find_vertices(maker, b.cells, b.solid);
     find_triangles(out, b.packed, b.solid, b.edges, b.cells);
     b.water.append(out, stack, heights);
 }

@@ -11,11 +11,15 @@
 
 namespace terrane {
 
+struct MeshKernels;
+
 /// One worker's mesher and its buffers. Belongs to one thread at a time; its contents never change
 /// results. Once the buffers have grown to the largest stack seen, nothing is allocated.
 class SurfaceNetsMesher {
   public:
     explicit SurfaceNetsMesher(const WorldDefinition& definition);
+    /// With kernels of one's own choice, for tests: all give the same mesh.
+    SurfaceNetsMesher(const WorldDefinition& definition, const MeshKernels& kernels);
     ~SurfaceNetsMesher();
     SurfaceNetsMesher(SurfaceNetsMesher&&) noexcept;
     SurfaceNetsMesher& operator=(SurfaceNetsMesher&&) noexcept;

@@ -1,6 +1,8 @@
 #include "generator/mesh/surface_nets.h"
 
+#include "generator/mesh/kernels/mesh_kernels.h"
 #include "generator/mesh/shade.h"
+#include "generator/terrain/kernels/kernel_choice.h"
 #include "generator/volume/color.h"
 #include "tests/support/ascii_cut.h"
 #include "tests/support/drawn_worlds.h"
@@ -379,6 +381,23 @@ TEST_P(SurfaceNetsOf, EveryVertexIsUsedAndWhatTheMesherDidBeforeDoesNotMatter) {
     const std::set<std::uint32_t> used(mesh.indices.begin(), mesh.indices.end());
     EXPECT_EQ(used.size(), mesh.vertex_count());
     EXPECT_EQ(*used.rbegin(), mesh.vertex_count() - 1);
+}
+
+TEST_P(SurfaceNetsOf, EveryInstructionSetMakesTheSameMesh) {
+    const Stack drawn = stack({.lod = 0, .x = 2, .z = -3}, 21, 2);
+    const HeightRange heights = {.first = -3, .last = 1000};
+    const Mesh chosen = mesh_of(letters_, drawn, heights);
+    ASSERT_GT(chosen.vertex_count(), std::size_t{4} * kCellBatch);
+    for (const KernelSet& set : available_kernel_sets()) {
+        SurfaceNetsMesher mesher(letters_.definition(), mesh_kernels_beside(*set.kernels));
+        Mesh mesh;
+        mesher.mesh(mesh, drawn, heights);
+        EXPECT_EQ(mesh.positions256, chosen.positions256) << set.name;
+        EXPECT_EQ(mesh.normals, chosen.normals) << set.name;
+        EXPECT_EQ(mesh.colors, chosen.colors) << set.name;
+        EXPECT_EQ(mesh.material_ids, chosen.material_ids) << set.name;
+        EXPECT_EQ(mesh.indices, chosen.indices) << set.name;
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, SurfaceNetsOf, testing::Values(&hills, &caves, &rubble, &depths),
