@@ -278,6 +278,7 @@ void Landscape::write(const ColumnWriterOutput& out, Region& region,
     grid.offsets.push_back(0);
     grid.limits.clear();
     out.element_ids.assign(region.elements.size(), kNoPaletteId);
+    out.element_limits.clear();
     out.highest_y256 = 0;
     const ColumnMaker maker({.world = *world_,
                              .constants = constants_,
@@ -308,6 +309,7 @@ void Landscape::write(const ColumnWriterOutput& out, Region& region,
                 const std::size_t id = grid.limits[i].palette_id;
                 if (id >= world_->base_palette.size()) {
                     out.element_ids[id - world_->base_palette.size()] = 0;
+                    out.element_limits.push_back(static_cast<std::uint32_t>(i));
                 }
             }
             if (is_inner) {

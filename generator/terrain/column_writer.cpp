@@ -1,6 +1,7 @@
 #include "generator/terrain/column_writer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -26,75 +27,123 @@ void put(Limit* to, std::int32_t y256, std::uint64_t tail) {
 struct ColumnSource {
     const Region& region;
     const std::int32_t* y256 = nullptr;
+    const std::int32_t* middle = nullptr;
     const float* height = nullptr;
     const std::int32_t* flow = nullptr;  ///< packed; of no flow, a zero
     std::ptrdiff_t plane = 0;
     std::ptrdiff_t flow_plane = 0;
     std::uint64_t gaps = 0;  ///< bit g: an element stands in gap g
+    bool layers_regular = false;
     std::int32_t column = 0;
     std::int32_t row = 0;
+
+    std::int32_t y256_of(std::size_t layer) const {
+        return y256[static_cast<std::ptrdiff_t>(layer) * plane];
+    }
 
     std::int32_t flow_of(std::size_t layer) const {
         return flow[static_cast<std::ptrdiff_t>(layer) * flow_plane];
     }
 };
 
+/// Where elements own limits, to give these their ids later.
+struct ElementUse {
+    std::span<std::uint16_t> ids;        ///< kNone, or 0 once the element owns a limit
+    std::vector<std::uint32_t>& limits;  ///< their numbers, ascending
+    const Limit* base;                   ///< of limit 0
+};
+
 /// The general walk: elements, pinched layers and materials that are alone.
 class ColumnWalk {
   public:
-    ColumnWalk(Limit* out, const ColumnSource& source, const std::vector<LayerRules>& rules,
-               std::span<std::uint16_t> element_ids)
-        : out_(out), source_(source), rules_(rules), element_ids_(element_ids) {}
+    ColumnWalk(const ColumnSource& source, const std::vector<LayerRules>& rules,
+               const ElementUse& elements)
+        : source_(source), rules_(rules), elements_(elements) {}
 
-    Limit* write() {
+    Limit* write(Limit* out) const {
         const std::size_t layers = rules_.size();
-        const std::int32_t* y256 = source_.y256;
-        const std::int32_t* flow = source_.flow;
+        State state{.out = out};
         for (std::size_t k = 0; k < layers; ++k) {
-            if (*y256 > bottom_) {
-                layer(*y256, k, tail_of(k, *flow));
+            if (source_.layers_regular && !state.on_element) {
+                // Up to the next gap with an element all is as where there are none.
+                const auto plain = static_cast<std::size_t>(std::countr_zero(source_.gaps >> k));
+                const std::size_t last = std::min(k + plain, layers - 1);
+                state = with_regular_layers(state, k, last);
+                k = last;
+            } else if (source_.y256_of(k) > state.bottom) {
+                state = with_layer(state, source_.y256_of(k), rules_[k],
+                                   tail_of(k, source_.flow_of(k)));
             }
             if ((source_.gaps >> k & 1U) != 0) {
-                elements(k);
+                state = with_elements(state, k);
             }
-            y256 += source_.plane;
-            flow += source_.flow_plane;
         }
-        put(out_++, bottom_, tail_of(layers, 0));
-        return out_;
+        put(state.out++, state.bottom, tail_of(layers, 0));
+        return state.out;
     }
 
   private:
-    void layer(std::int32_t top, std::size_t k, std::uint64_t tail) {
-        const LayerRules& rule = rules_[k];
-        const std::int32_t blend = below_alone_ || rule.alone ? 0 : rule.blend;
-        if (bottom_ == 0) {
-            put(out_++, 0, tail);
-        } else {
-            if (on_element_) {  // what is below shows the element: begin anew
-                put(out_++, bottom_, blend > 0 ? below_ : tail);
-            }
-            if (blend > 0 || !on_element_) {
-                blend_or_frontier(top, blend, tail);
+    /// How far the walk is; handed on by value, so that it stays in registers.
+    struct State {
+        Limit* out = nullptr;
+        std::int32_t bottom = 0;
+        bool below_alone = false;
+        bool on_element = false;  ///< the last limit shows an element, not the layer below
+        std::uint64_t below = 0;  ///< tail of the last layer with something of its own below
+    };
+
+    /// Layers first..last, each on the one right below it.
+    State with_regular_layers(State state, std::size_t first, std::size_t last) const {
+        const auto at = static_cast<std::ptrdiff_t>(first) * source_.plane;
+        const std::int32_t* y256 = source_.y256 + at;
+        const std::int32_t* middle = source_.middle + at;
+        const std::int32_t* flow =
+            source_.flow + static_cast<std::ptrdiff_t>(first) * source_.flow_plane;
+        Limit* out = state.out;
+        std::uint64_t tail = 0;
+        for (std::size_t k = first; k <= last; ++k) {
+            tail = tail_of(k, *flow);
+            put(out, *middle, tail);
+            put(out + 1, *y256, tail);
+            out += 2;
+            y256 += source_.plane;
+            middle += source_.plane;
+            flow += source_.flow_plane;
+        }
+        return {.out = out,
+                .bottom = y256[-source_.plane],
+                .below_alone = rules_[last].alone,
+                .below = tail};
+    }
+
+    static State with_layer(State state, std::int32_t top, const LayerRules& rule,
+                            std::uint64_t tail) {
+        const std::int32_t blend = state.below_alone || rule.alone ? 0 : rule.blend;
+        if (state.bottom == 0) {
+            put(state.out++, 0, tail);
+        } else if (!state.on_element) {
+            state.out = blend_or_frontier(state, top, blend, tail);
+        } else {  // what is below shows the element: begin anew
+            put(state.out++, state.bottom, blend > 0 ? state.below : tail);
+            if (blend > 0) {
+                state.out = blend_or_frontier(state, top, blend, tail);
             }
         }
-        put(out_++, top, tail);
-        bottom_ = top;
-        below_ = tail;
-        below_alone_ = rule.alone;
-        on_element_ = false;
+        put(state.out++, top, tail);
+        return {.out = state.out, .bottom = top, .below_alone = rule.alone, .below = tail};
     }
 
     /// The limit where `tail` alone begins to be shown; left out if that is only at its top.
-    void blend_or_frontier(std::int32_t top, std::int32_t blend, std::uint64_t tail) {
-        const std::int32_t thickness = top - bottom_;
+    static Limit* blend_or_frontier(State state, std::int32_t top, std::int32_t blend,
+                                    std::uint64_t tail) {
+        const std::int32_t thickness = top - state.bottom;
         const std::int32_t part = std::max(blend > 0 ? 1 : 0, (thickness * blend + 128) >> 8);
-        put(out_, bottom_ + part, tail);
-        out_ += part < thickness ? 1 : 0;
+        put(state.out, state.bottom + part, tail);
+        return state.out + (part < thickness ? 1 : 0);
     }
 
     /// The elements of gap k, last first: each owns what rises above those before it.
-    void elements(std::size_t k) {
+    State with_elements(State state, std::size_t k) const {
         const Region& region = source_.region;
         const std::size_t end =
             k + 1 < rules_.size() ? region.gap_begin[k + 1] : region.elements.size();
@@ -105,33 +154,40 @@ class ColumnWalk {
             const float thickness = thickness_at(region.elements[e - 1]);
             const float top = height + thickness;
             if (thickness > 0 && top > current) {
-                element(e - 1, k, static_cast<std::int32_t>(top * 256.0F + 0.5F), first_owner);
+                const auto top256 = static_cast<std::int32_t>(top * 256.0F + 0.5F);
+                if (top256 > state.bottom) {
+                    state = with_element(state, e - 1, k, top256, first_owner);
+                }
                 first_owner = false;
                 current = top;
             }
         }
+        return state;
     }
 
-    void element(std::size_t e, std::size_t k, std::int32_t top, bool first_owner) {
-        if (top <= bottom_) {
-            return;
-        }
+    State with_element(State state, std::size_t e, std::size_t k, std::int32_t top,
+                       bool first_owner) const {
         const Element& own = source_.region.elements[e].element();
         const bool is_cave = own.type == ElementType::cave;
-        const bool blends = first_owner && own.blend > 0 && !below_alone_;
+        const bool blends = first_owner && own.blend > 0 && !state.below_alone;
         const std::uint64_t tail = tail_of(rules_.size() + 1 + e, is_cave ? 0 : source_.flow_of(k));
-        element_ids_[e] = 0;
-        if (blends) {
-            if (on_element_) {
-                put(out_++, bottom_, below_);
-            }
-            blend_or_frontier(top, own.blend, tail);
-        } else {
-            put(out_++, bottom_, tail);
+        if (blends && state.on_element) {
+            put(state.out++, state.bottom, state.below);
         }
-        put(out_++, top, tail);
-        bottom_ = top;
-        on_element_ = true;
+        const Limit* const first = state.out;
+        if (blends) {
+            state.out = blend_or_frontier(state, top, own.blend, tail);
+        } else {
+            put(state.out++, state.bottom, tail);
+        }
+        put(state.out++, top, tail);
+        elements_.ids[e] = 0;
+        for (const Limit* limit = first; limit != state.out; ++limit) {
+            elements_.limits.push_back(static_cast<std::uint32_t>(limit - elements_.base));
+        }
+        state.bottom = top;
+        state.on_element = true;
+        return state;
     }
 
     float thickness_at(const PlacedElement& placed) const {
@@ -144,14 +200,9 @@ class ColumnWalk {
             .thickness[placed.raster + static_cast<std::size_t>(z * placed.stride + x)];
     }
 
-    Limit* out_;
     const ColumnSource& source_;
     const std::vector<LayerRules>& rules_;
-    std::span<std::uint16_t> element_ids_;  ///< kNone, or 0 once the element owns a limit
-    std::int32_t bottom_ = 0;
-    std::uint64_t below_ = 0;  ///< tail of the last layer with something of its own below
-    bool below_alone_ = false;
-    bool on_element_ = false;  ///< the last limit shows an element, not that layer
+    const ElementUse& elements_;
 };
 
 /// Limits a column can have at most: two a layer and one where it begins, three an element, the
@@ -164,8 +215,8 @@ std::size_t column_limits_max(const Region& region, std::size_t layers) {
 class RowWriter {
   public:
     RowWriter(const Region& region, const std::vector<LayerRules>& rules, const RowKernels& kernels,
-              std::span<std::uint16_t> element_ids, std::int32_t z)
-        : region_(region), rules_(rules), kernels_(kernels), element_ids_(element_ids), z_(z) {
+              const ElementUse& elements, std::int32_t z)
+        : region_(region), rules_(rules), kernels_(kernels), elements_(elements), z_(z) {
         const auto shape_row = static_cast<std::ptrdiff_t>(z + 1) * region.shape.stride();
         plain_.y256 = region.y256.data() + shape_row;
         plain_.middle = region.middle.data() + shape_row;
@@ -175,9 +226,10 @@ class RowWriter {
         irregular_ = region.irregular.data() + shape_row;
     }
 
-    /// Columns first <= x < end; `end_of` gets where each one's limits end, counted from `base`.
+    /// Columns first <= x < end; `end_of` gets where each one's limits end.
     Limit* write(Limit* out, std::int32_t first, std::int32_t end, bool has_flow,
-                 std::uint32_t* end_of, const Limit* base) {
+                 std::uint32_t* end_of) {
+        const Limit* const base = elements_.base;
         if (has_flow) {
             plain_.flow =
                 region_.flow.data() + static_cast<std::ptrdiff_t>(z_) * region_.flow_stride - 1;
@@ -198,7 +250,7 @@ class RowWriter {
                 }
                 continue;
             }
-            out = ColumnWalk(out, source_at(x, has_flow), rules_, element_ids_).write();
+            out = ColumnWalk(source_at(x, has_flow), rules_, elements_).write(out);
             *end_of++ = static_cast<std::uint32_t>(out - base);
             ++x;
         }
@@ -211,11 +263,13 @@ class RowWriter {
         const auto at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1);
         return {.region = region_,
                 .y256 = region_.y256.data() + at,
+                .middle = region_.middle.data() + at,
                 .height = region_.heights.data() + at,
                 .flow = has_flow ? plain_.flow + x + 1 : &kNoFlow,
                 .plane = static_cast<std::ptrdiff_t>(plain_.plane),
                 .flow_plane = has_flow ? static_cast<std::ptrdiff_t>(plain_.flow_plane) : 0,
                 .gaps = region_.gap_mask[at],
+                .layers_regular = region_.irregular[at] == kElementStands,
                 .column = x + 1,
                 .row = z_ + 1};
     }
@@ -223,7 +277,7 @@ class RowWriter {
     const Region& region_;
     const std::vector<LayerRules>& rules_;
     const RowKernels& kernels_;
-    std::span<std::uint16_t> element_ids_;
+    const ElementUse& elements_;
     std::int32_t z_;
     PlainRow plain_;
     const std::uint8_t* irregular_ = nullptr;
@@ -260,10 +314,9 @@ void number_elements(const ColumnWriterOutput& out, const Region& region, const 
     if (all_used) {
         return;
     }
-    for (Limit& limit : out.grid.limits) {
-        if (limit.palette_id >= first_id) {
-            limit.palette_id = out.element_ids[limit.palette_id - first_id];
-        }
+    for (const std::uint32_t i : out.element_limits) {
+        std::uint16_t& id = out.grid.limits[i].palette_id;
+        id = out.element_ids[id - first_id];
     }
 }
 
@@ -283,6 +336,7 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
     const std::size_t row_limits_max =
         row_columns * column_limits_max(region, constants.rules.size());
     out.element_ids.assign(region.elements.size(), kNone);
+    out.element_limits.clear();
     std::size_t used = 0;
     std::uint32_t* end_of = grid.offsets.data() + 1;
     for (std::int32_t z = -apron; z < length + apron; ++z) {
@@ -291,13 +345,15 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
         }
         Limit* const base = grid.limits.data();
         Limit* at = base + used;
-        RowWriter row(region, constants.rules, kernels, out.element_ids, z);
+        const ElementUse elements{
+            .ids = out.element_ids, .limits = out.element_limits, .base = base};
+        RowWriter row(region, constants.rules, kernels, elements, z);
         if (z < 0 || z >= length) {
-            at = row.write(at, -apron, width + apron, false, end_of, base);
+            at = row.write(at, -apron, width + apron, false, end_of);
         } else {
-            at = row.write(at, -apron, 0, false, end_of, base);
-            at = row.write(at, 0, width, true, end_of + apron, base);
-            at = row.write(at, width, width + apron, false, end_of + apron + width, base);
+            at = row.write(at, -apron, 0, false, end_of);
+            at = row.write(at, 0, width, true, end_of + apron);
+            at = row.write(at, width, width + apron, false, end_of + apron + width);
         }
         end_of += row_columns;
         used = static_cast<std::size_t>(at - base);

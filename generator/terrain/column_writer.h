@@ -18,7 +18,8 @@ struct ColumnWriterOutput {
     ColumnGrid& grid;
     Palette& palette;                         ///< layers, void, then the elements that own a limit
     std::int32_t& highest_y256;               ///< of the inner columns
-    std::vector<std::uint16_t>& element_ids;  ///< scratch
+    std::vector<std::uint16_t>& element_ids;  ///< scratch, see number_elements
+    std::vector<std::uint32_t>& element_limits;  ///< likewise
 };
 
 /// Writes the region's inner columns (apron 0), or those around them too (apron 1; these have no
@@ -28,7 +29,9 @@ void write_columns(const ColumnWriterOutput& out, const Region& region, const Wo
                    const RowKernels& kernels);
 
 /// Gives the elements that own limits the ids after the world's own entries, in their order, in the
-/// limits and in the palette. `out.element_ids` says which do (not kNoPaletteId) and gets the ids.
+/// limits and in the palette. `out.element_ids` says which do (not kNoPaletteId) and gets the ids;
+/// `out.element_limits` are the numbers of their limits, whose ids are the elements' own numbers
+/// behind the world's entries.
 void number_elements(const ColumnWriterOutput& out, const Region& region, const World& world);
 
 }  // namespace terrane

@@ -22,6 +22,7 @@ struct StackGenerator::Buffers {
     PlotCache plots;
     Region region;
     std::vector<std::uint16_t> element_ids;
+    std::vector<std::uint32_t> element_limits;
     std::optional<Landscape> landscape;  ///< of worlds that have one
 };
 
@@ -101,7 +102,8 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
-           .element_ids = buffers_->element_ids},
+           .element_ids = buffers_->element_ids,
+           .element_limits = buffers_->element_limits},
           rectangle, 1);
     return {};
 }
@@ -116,7 +118,8 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
-           .element_ids = buffers_->element_ids},
+           .element_ids = buffers_->element_ids,
+           .element_limits = buffers_->element_limits},
           rectangle, 0);
     return {};
 }

@@ -122,7 +122,7 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
         for (std::size_t i = 0; i < static_cast<std::size_t>(placed.columns); ++i) {
             if (thickness[i] > 0) {
                 region.gap_mask[first + i] |= gap_bit;
-                region.irregular[first + i] = 1;
+                region.irregular[first + i] |= kElementStands;
                 if (region.elements_lift) {
                     region.stacked[first + i] =
                         std::max(region.stacked[first + i], height[first + i] + thickness[i]);

@@ -39,6 +39,8 @@ struct PlacedElement {
     const Element& element() const { return plotted->element; }
 };
 
+inline constexpr std::uint8_t kElementStands = 2;
+
 /// A worker's rasters and buffers; refilled by build_region.
 struct Region {
     ColumnRectangle inner;
@@ -56,8 +58,8 @@ struct Region {
     std::vector<std::uint64_t> gap_mask;   ///< per column of shape: bit g: an element in gap g
     /// K planes: where each layer's blend into the one right below ends, in 1/256 voxel.
     std::vector<std::int32_t> middle;
-    /// Per column of shape: not 0 where a layer pinches out, a blend reaches its layer's top, or an
-    /// element stands.
+    /// Per column of shape: bit 0 where a layer pinches out or a blend reaches its layer's top,
+    /// kElementStands where an element stands.
     std::vector<std::uint8_t> irregular;
 
     NoiseBuffers noise_buffers;
