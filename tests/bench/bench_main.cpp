@@ -42,7 +42,7 @@ class CollectingReporter : public benchmark::ConsoleReporter {
             const double seconds =
                 rate != run.counters.end() && rate->second.value > 0
                     ? 1 / rate->second.value
-                    : (waits(run) ? run.real_accumulated_time : run.cpu_accumulated_time) /
+                    : (has_own_clock(run) ? run.real_accumulated_time : run.cpu_accumulated_time) /
                           static_cast<double>(run.iterations);
             // Without the repetition count that str() appends.
             const std::string& arguments = run.run_name.args;
@@ -54,11 +54,9 @@ class CollectingReporter : public benchmark::ConsoleReporter {
         }
     }
 
-    /// Whether a benchmark measures the clock on the wall, since it uses several threads; all
-    /// others count processor time, which a busy machine disturbs less.
-    static bool waits(const Run& run) {
-        return run.run_name.time_type.find("real_time") != std::string::npos;
-    }
+    /// Whether a benchmark measures the clock on the wall, since it uses several threads, or times
+    /// itself; all others count processor time, which a busy machine disturbs less.
+    static bool has_own_clock(const Run& run) { return !run.run_name.time_type.empty(); }
 
     /// Median seconds an item; 0 if the benchmark did not run.
     double median(const std::string& name) const {

@@ -1,5 +1,6 @@
 // A cold mesh, whole and stage by stage, against Draco's encoding alone; and two workers against
-// one.
+// one. Two worlds: the paper's B3 in stacks of 32 x 32, whose meshes have some 3,000 triangles, and
+// basin, of more and thinner layers, with caves.
 #include "generator/mesh/draco_codec.h"
 #include "generator/mesh/height_field.h"
 #include "generator/mesh/surface_nets.h"
@@ -10,8 +11,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <cstdint>
+#include <cstdlib>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <thread>
@@ -20,18 +22,30 @@
 namespace terrane::bench {
 namespace {
 
-constexpr const char* kWorld = "basin";
+std::shared_ptr<const World> chain_world(const std::string& name) {
+    const auto world = bench_world(name);
+    WorldDefinition definition = world->definition;
+    definition.grid.side = definition.grid.height = 32;
+    auto wide = World::build(definition);
+    if (!wide) {
+        std::abort();
+    }
+    return std::make_shared<const World>(std::move(*wide));
+}
 
 /// What a worker has, and one stack after another, so that no cache holds the answer.
 struct Chain {
-    std::shared_ptr<const World> world = bench_world(kWorld);
+    std::shared_ptr<const World> world;
     StackGenerator generator{*world};
     SurfaceNetsMesher mesher{world->definition};
     DracoSettings settings{
         .side = world->definition.grid.side,
         .height_voxels = static_cast<std::int32_t>(world->stack.height_bound) + 3};
+    HeightRange heights{.first = 0, .last = settings.height_voxels};
     Stack stack;
     Mesh mesh;
+
+    explicit Chain(const std::string& name) : world(chain_world(name)) {}
 
     bool generate(std::int64_t i) {
         const StackPos position{.lod = 0,
@@ -40,17 +54,8 @@ struct Chain {
         return generator.generate(stack, position).has_value();
     }
 
-    void make_mesh() { mesher.mesh(mesh, stack, heights_of(stack)); }
-
     /// Every surface there is, those towards the apron too.
-    static HeightRange heights_of(const Stack& stack) {
-        std::int32_t highest = 0;
-        const ColumnGrid& columns = stack.columns;
-        for (std::size_t i = 1; i < columns.offsets.size(); ++i) {
-            highest = std::max(highest, columns.limits[columns.offsets[i] - 1].y256);
-        }
-        return {.first = 0, .last = highest / kUnitsPerVoxel + 2};
-    }
+    void make_mesh() { mesher.mesh(mesh, stack, heights); }
 
     std::size_t encode() const {
         const auto bytes = encode_draco(mesh, settings);
@@ -58,65 +63,41 @@ struct Chain {
     }
 };
 
-void cold_generate(benchmark::State& state) {
-    Chain chain;
-    std::int64_t i = 0;
-    for (auto _ : state) {
-        benchmark::DoNotOptimize(chain.generate(i++));
-    }
+enum class Stage : std::uint8_t { generate, mesh, encode, whole };
+
+double thread_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// A few stacks, made beforehand.
-struct Prepared {
-    Chain chain;
-    std::vector<Stack> stacks = std::vector<Stack>(16);
-    std::vector<Mesh> meshes = std::vector<Mesh>(16);
-
-    Prepared() {
-        for (std::size_t i = 0; i < stacks.size(); ++i) {
-            chain.generate(static_cast<std::int64_t>(i) * 17);
-            stacks[i] = chain.stack;
-            chain.make_mesh();
-            meshes[i] = chain.mesh;
-        }
-    }
-};
-
-void cold_mesh(benchmark::State& state) {
-    Prepared prepared;
-    std::size_t i = 0;
+/// The whole chain over the same stacks whatever stage is timed, so that each finds in the caches
+/// what the one before left there.
+void cold(benchmark::State& state, const std::string& name, Stage stage) {
+    Chain chain(name);
+    std::int64_t i = 0;
     std::size_t triangles = 0;
     for (auto _ : state) {
-        const Stack& stack = prepared.stacks[i++ % 16];
-        prepared.chain.mesher.mesh(prepared.chain.mesh, stack, Chain::heights_of(stack));
-        triangles += prepared.chain.mesh.triangle_count();
+        const double begin = thread_seconds();
+        chain.generate(i++);
+        const double generated = thread_seconds();
+        chain.make_mesh();
+        const double meshed = thread_seconds();
+        benchmark::DoNotOptimize(chain.encode());
+        const double encoded = thread_seconds();
+        triangles += chain.mesh.triangle_count();
+        state.SetIterationTime(stage == Stage::generate ? generated - begin
+                               : stage == Stage::mesh   ? meshed - generated
+                               : stage == Stage::encode ? encoded - meshed
+                                                        : encoded - begin);
     }
     state.counters["triangles"] =
         static_cast<double>(triangles) / static_cast<double>(state.iterations());
 }
 
-void cold_encode(benchmark::State& state) {
-    Prepared prepared;
-    std::size_t i = 0;
-    for (auto _ : state) {
-        const auto bytes = encode_draco(prepared.meshes[i++ % 16], prepared.chain.settings);
-        benchmark::DoNotOptimize(bytes->data());
-    }
-}
-
-void cold_whole(benchmark::State& state) {
-    Chain chain;
-    std::int64_t i = 0;
-    for (auto _ : state) {
-        chain.generate(i++);
-        chain.make_mesh();
-        benchmark::DoNotOptimize(chain.encode());
-    }
-}
-
 /// A coarse level's tile: generate, height field with skirts, encode.
 void cold_level(benchmark::State& state) {
-    Chain chain;
+    Chain chain("basin");
     HeightFieldMesher mesher(chain.world->definition);
     std::int32_t i = 0;
     for (auto _ : state) {
@@ -135,52 +116,72 @@ void cold_level(benchmark::State& state) {
 void workers_whole(benchmark::State& state) {
     const auto workers = static_cast<std::int64_t>(state.range(0));
     constexpr std::int64_t kStacks = 64;
-    std::vector<Chain> chains(static_cast<std::size_t>(workers));
+    std::vector<std::unique_ptr<Chain>> chains;
+    for (std::int64_t w = 0; w < workers; ++w) {
+        chains.push_back(std::make_unique<Chain>("basin"));
+    }
     std::int64_t round = 0;
     for (auto _ : state) {
         std::vector<std::jthread> threads;
         for (std::int64_t w = 0; w < workers; ++w) {
-            threads.emplace_back([&chain = chains[static_cast<std::size_t>(w)], w, workers, round] {
-                const std::int64_t share = kStacks / workers;
-                for (std::int64_t i = w * share; i < (w + 1) * share; ++i) {
-                    chain.generate(round * kStacks + i);
-                    chain.make_mesh();
-                    benchmark::DoNotOptimize(chain.encode());
-                }
-            });
+            threads.emplace_back(
+                [&chain = *chains[static_cast<std::size_t>(w)], w, workers, round] {
+                    const std::int64_t share = kStacks / workers;
+                    for (std::int64_t i = w * share; i < (w + 1) * share; ++i) {
+                        chain.generate(round * kStacks + i);
+                        chain.make_mesh();
+                        benchmark::DoNotOptimize(chain.encode());
+                    }
+                });
         }
         threads.clear();
         ++round;
     }
 }
 
-BENCHMARK(cold_generate)->Unit(benchmark::kMicrosecond);
-BENCHMARK(cold_mesh)->Unit(benchmark::kMicrosecond);
-BENCHMARK(cold_encode)->Unit(benchmark::kMicrosecond);
-BENCHMARK(cold_whole)->Unit(benchmark::kMicrosecond);
+void register_stages() {
+    for (const std::string world : {"paper-B3", "basin"}) {
+        const auto add = [&world](const std::string& name, Stage stage) {
+            benchmark::RegisterBenchmark(
+                (name + "/" + world).c_str(),
+                [world, stage](benchmark::State& state) { cold(state, world, stage); })
+                ->Iterations(128)
+                ->UseManualTime()
+                ->Unit(benchmark::kMicrosecond);
+        };
+        add("cold_generate", Stage::generate);
+        add("cold_mesh", Stage::mesh);
+        add("cold_encode", Stage::encode);
+        add("cold_whole", Stage::whole);
+    }
+}
+
+const bool kRegistered = (register_stages(), true);
+
 BENCHMARK(cold_level)->Arg(1)->Arg(3)->Arg(5)->Arg(9)->Arg(17)->Unit(benchmark::kMicrosecond);
 BENCHMARK(workers_whole)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
-const RatioEntry kWhole{{.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone",
-                         .numerators = {"cold_whole"},
-                         .denominator = "cold_encode",
-                         .bar = 1.4}};
+const RatioEntry kWholePaper{
+    {.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone, paper's B3",
+     .numerators = {"cold_whole/paper-B3"},
+     .denominator = "cold_encode/paper-B3",
+     .bar = 1.2}};
+const RatioEntry kWholeBasin{{.what = "the same, basin",
+                              .numerators = {"cold_whole/basin"},
+                              .denominator = "cold_encode/basin",
+                              .bar = 1.4}};
 const RatioEntry kLevelsOf[] = {RatioEntry{{.what = "whole cold mesh of level 1 / of level 0",
                                             .numerators = {"cold_level/1"},
-                                            .denominator = "cold_whole",
+                                            .denominator = "cold_whole/basin",
                                             .bar = 1.3}},
                                 RatioEntry{{.what = "whole cold mesh of level 5 / of level 0",
                                             .numerators = {"cold_level/5"},
-                                            .denominator = "cold_whole",
+                                            .denominator = "cold_whole/basin",
                                             .bar = 1.3}},
                                 RatioEntry{{.what = "whole cold mesh of level 17 / of level 0",
                                             .numerators = {"cold_level/17"},
-                                            .denominator = "cold_whole",
+                                            .denominator = "cold_whole/basin",
                                             .bar = 1.3}}};
-const RatioEntry kMesh{{.what = "mesh / its Draco encode",
-                        .numerators = {"cold_mesh"},
-                        .denominator = "cold_encode",
-                        .bar = 0.08}};
 const RatioEntry kWorkers{{.what = "two workers / one worker, time for 64 cold meshes",
                            .numerators = {"workers_whole/2"},
                            .denominator = "workers_whole/1",
