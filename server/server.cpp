@@ -123,6 +123,14 @@ Result<Doors> open_doors(const ServerOptions& options) {
     return doors;
 }
 
+constexpr std::array<std::pair<const char*, Counter OutcomeCounters::*>, 6> kOutcomes = {
+    {{"cache", &OutcomeCounters::cache},
+     {"store", &OutcomeCounters::store},
+     {"generated", &OutcomeCounters::generated},
+     {"busy", &OutcomeCounters::busy},
+     {"cancelled", &OutcomeCounters::cancelled},
+     {"failed", &OutcomeCounters::failed}}};
+
 constexpr const char* kNoRoom = "too many sessions are open";
 
 /// What a port says to a client for whom there is no room.
@@ -224,7 +232,9 @@ struct Server::Impl {
                    .admit =
                        [this](const ClientHello& hello) {
                            return doors.admit(hello.token, sessions.caps);
-                       }},
+                       },
+                   .requests_log = options.log_requests ? &log : nullptr,
+                   .next_request_id = &next_request_id},
           routes{.service = &service,
                  .world = world.get(),
                  .hello = &sessions.hello,
@@ -301,12 +311,12 @@ std::vector<MetricSample> Server::Impl::samples() {
     using Kind = MetricSample::Kind;
     std::vector<MetricSample> out;
     const auto add = [&out](Kind kind, const char* name, const char* help, auto value,
-                            const char* label = "") {
+                            std::string labels = {}) {
         out.push_back({.name = name,
                        .help = help,
                        .kind = kind,
                        .value = static_cast<double>(value),
-                       .label = label});
+                       .labels = std::move(labels)});
     };
     const auto counter = [&add](const char* name, const char* help, const auto& value,
                                 const char* label = "") {
@@ -315,16 +325,16 @@ std::vector<MetricSample> Server::Impl::samples() {
     const auto gauge = [&add](const char* name, const char* help, auto value) {
         add(Kind::gauge, name, help, value);
     };
-    const char* const outcomes = "Chunk requests, by outcome";
-    const char* const requests = "terrane_requests_total";
-    add(Kind::counter, requests, outcomes, count_of(counters.cache_hits), "outcome=cache");
-    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::store), "outcome=store");
-    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::generated),
-        "outcome=generated");
-    add(Kind::counter, requests, outcomes, count_of(counters.busy), "outcome=busy");
-    add(Kind::counter, requests, outcomes, count_of(counters.cancelled), "outcome=cancelled");
-    add(Kind::counter, requests, outcomes, count_of(counters.failed), "outcome=failed");
+    for (std::size_t i = 0; i < kRequestKinds.size(); ++i) {
+        for (const auto& [outcome, member] : kOutcomes) {
+            add(Kind::counter, "terrane_requests_total", "Requests, by what was asked and outcome",
+                count_of(counters.outcomes[i].*member),
+                "kind=" + std::string(kRequestKinds[i]) + ",outcome=" + outcome);
+        }
+    }
     counter("terrane_generations_total", "Chunk stacks made", counters.generations);
+    counter("terrane_undelivered_total", "Answers that could not be handed on for want of memory",
+            counters.undelivered);
     counter("terrane_joins_total", "Requests that joined one in flight", counters.joins);
     counter("terrane_stack_hits_total", "Stacks found in memory", counters.stack_hits);
     gauge("terrane_queue_jobs", "Stacks that wait for a worker", service.queued_jobs());

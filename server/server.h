@@ -39,7 +39,7 @@ struct ServerOptions {
     std::optional<TlsServer::Files> tls = {};  ///< of both ports
     std::filesystem::path token_file = {};     ///< empty: none
     std::optional<bool> anonymous = {};        ///< default: if there is no token file
-    bool log_requests = false;                 ///< a debug line for each HTTP request
+    bool log_requests = false;                 ///< a debug line for each request
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;

@@ -260,7 +260,7 @@ int serve_until_told(const ServerConfig& config, const ServerOptions& options, L
     (*server)->stop(std::chrono::seconds(config.drain_timeout_s));
     log.info("stopped", {{"generations", count_of((*server)->counters().generations)},
                          {"answers", count_of((*server)->counters().answers)},
-                         {"cache_hits", count_of((*server)->counters().cache_hits)},
+                         {"cache_hits", count_of((*server)->counters(), &OutcomeCounters::cache)},
                          {"store_failures", count_of((*server)->counters().store_failures)},
                          {"store_corrupt", count_of((*server)->counters().store_corrupt)}});
     return kExitDone;

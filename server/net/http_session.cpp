@@ -196,6 +196,7 @@ void HttpSession::process(Clock::time_point now) {
 void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
     context_.counters->requests.fetch_add(1, std::memory_order_relaxed);
     received.request.id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
+    received.request.session = origin_.id;
     received.request.flow = flow_;
     received.request.stop = stop_.get_token();
     pending_ = std::make_shared<Pending>();
@@ -213,6 +214,7 @@ void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
     const auto pending = pending_;
     if (received.request.path == context_.websocket.path && context_.websocket.make) {
         if (upgrades(received)) {
+            log_answer(*pending, 101, 0);
             pending_.reset();
             upgrade_ = std::move(received);
             return;
@@ -253,22 +255,27 @@ void HttpSession::answer(const Pending& pending, HttpResponse response) {
     outbox_.push(
         http_head(response, pending.id, keep_alive, http_date(std::chrono::system_clock::now())),
         has_body ? response.body : nullptr);
-    if (context_.requests_log != nullptr) {
-        const auto took =
-            std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
-        context_.requests_log->debug(
-            "http", {{"request", pending.id},
-                     {"session", origin_.id},
-                     {"method", pending.method},
-                     {"path", pending.path},
-                     {"status", std::uint64_t{response.status}},
-                     {"bytes", std::uint64_t{response.body ? response.body->size() : 0}},
-                     {"us", std::int64_t{took.count()}}});
-    }
+    log_answer(pending, response.status, response.body ? response.body->size() : 0);
     pending_.reset();
     if (!keep_alive) {
         close_with({});
     }
+}
+
+void HttpSession::log_answer(const Pending& pending, unsigned status,
+                             std::size_t body_bytes) const {
+    if (context_.requests_log == nullptr) {
+        return;
+    }
+    const auto took =
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
+    context_.requests_log->debug("http", {{"request", pending.id},
+                                          {"session", origin_.id},
+                                          {"method", pending.method},
+                                          {"path", pending.path},
+                                          {"status", std::uint64_t{status}},
+                                          {"bytes", std::uint64_t{body_bytes}},
+                                          {"us", std::int64_t{took.count()}}});
 }
 
 void HttpSession::refuse(const HttpFault& fault) {
@@ -277,6 +284,12 @@ void HttpSession::refuse(const HttpFault& fault) {
     const auto id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
     outbox_.push(http_head(response, id, false, http_date(std::chrono::system_clock::now())),
                  response.body);
+    if (context_.requests_log != nullptr) {
+        context_.requests_log->debug("http", {{"request", id},
+                                              {"session", origin_.id},
+                                              {"status", std::uint64_t{fault.status}},
+                                              {"fault", fault.detail}});
+    }
     close_with(std::string(to_string(ErrorCode::malformed)) + ": " + fault.detail);
 }
 

@@ -92,6 +92,7 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     void process(Clock::time_point now);
     void dispatch(ReceivedRequest received, Clock::time_point now);
     void answer(const Pending& pending, HttpResponse response);
+    void log_answer(const Pending& pending, unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);
     void close_with(std::string reason);
     bool upgrades(const ReceivedRequest& received);

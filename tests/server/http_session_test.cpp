@@ -155,7 +155,7 @@ TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
         }
         EXPECT_TRUE(f.session->is_dead());
         EXPECT_EQ(f.service->in_flight(), 0U);
-        EXPECT_EQ(count_of(f.counters.cancelled), 1U);
+        EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
         f.gate.passes.release();
     }
 }
