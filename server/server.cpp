@@ -51,7 +51,7 @@ Result<std::unique_ptr<ChunkStore>> open_store(const ServerOptions& options, con
     return open_rocksdb_store(options.data_directory, identity, rocksdb);
 }
 
-ServerHello hello_of(const World& world) {
+ServerHello hello_of(const World& world, std::int32_t tileset_levels) {
     const WorldDefinition& definition = world.definition;
     ServerHello hello{.protocol_version = kProtocolVersion,
                       .server_version = kServerVersion,
@@ -59,7 +59,7 @@ ServerHello hello_of(const World& world) {
                       .encoding_version = kEncodingVersion,
                       .world_name = definition.name,
                       .fingerprint = world.fingerprint,
-                      .content_id = content_id_of(world),
+                      .content_id = served_content_id(content_id_of(world), tileset_levels),
                       .chunk_side = definition.grid.side,
                       .chunk_height = definition.grid.height,
                       .voxel_size_m = definition.grid.voxel_size_m,
@@ -224,7 +224,7 @@ struct Server::Impl {
                       };
                   }),
           sessions{.service = &service,
-                   .hello = hello_of(*world),
+                   .hello = hello_of(*world, options.tileset_levels),
                    .world_file = options.publish_world ? canonical_world_file(world->definition)
                                                        : std::string(),
                    .timeouts = options.timeouts,
@@ -239,6 +239,7 @@ struct Server::Impl {
                  .world = world.get(),
                  .hello = &sessions.hello,
                  .world_file = sessions.world_file,
+                 .tileset_levels = options.tileset_levels,
                  .is_ready = [this] { return !draining.load(); },
                  .metrics = [this] { return metrics.text(samples()); }},
           router(sessions.hello.content_id,
@@ -354,7 +355,8 @@ std::vector<MetricSample> Server::Impl::samples() {
     add(Kind::counter, "terrane_store_failures_total", "Reads or writes that the disk refused",
         stats.failures);
     gauge("terrane_store_disk_bytes", "The store's tables", stats.disk_bytes);
-    gauge("terrane_store_memtable_bytes", "Written, and not yet in a table", stats.memtable_bytes);
+    gauge("terrane_store_memtable_bytes", "Written, and not yet in a table; all of a memory store",
+          stats.memtable_bytes);
     gauge("terrane_store_block_cache_bytes", "Blocks of tables in memory", stats.block_cache_bytes);
     gauge("terrane_store_pending_compaction_bytes", "What merging tables has yet to read",
           stats.pending_compaction_bytes);
