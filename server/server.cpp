@@ -257,7 +257,15 @@ struct Server::Impl {
                .new_flow = [this] { return service.new_flow_id(); },
                .timeouts = options.http_timeouts,
                .websocket = websocket_upgrade(sessions),
-               .requests_log = options.log_requests ? &log : nullptr} {
+               .requests_log = options.log_requests ? &log : nullptr,
+               .rates_of =
+                   [this](std::string_view token) {
+                       // Who is not let in gets refusals, at the rate of everybody.
+                       const SessionCaps caps =
+                           clamped(doors.admit(token, sessions.caps).value_or(sessions.caps));
+                       return HttpRates{.requests_per_second_max = caps.requests_per_second_max,
+                                        .bytes_per_second_max = caps.bytes_per_second_max};
+                   }} {
         add_chunk_routes(router, routes);
         add_world_routes(router, routes);
         add_state_routes(router, routes);
