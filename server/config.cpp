@@ -1,6 +1,7 @@
 #include "server/config.h"
 
 #include "server/chunks/worker_pool.h"
+#include "server/http/tiles3d.h"
 #include "server/net/listener.h"
 #include "server/net/session_caps.h"
 #include "server/toml_settings.h"
@@ -141,15 +142,22 @@ std::vector<Setting> all_settings() {
          .least = kCreditWindowBytesMin,
          .most = kCreditWindowBytesMax},
         {.key = "requests_per_second_max",
-         .help = "Requests of one session; 0: as many as it likes",
+         .help = "Requests of one session or HTTP connection; 0: as many as it likes",
          .member = &Config::requests_per_second_max,
          .least = 0,
          .most = std::uint64_t{1} << 20U},
         {.key = "bytes_per_second_max",
-         .help = "Bytes to one session; 0: as many as it takes",
+         .help = "Bytes to one session or HTTP connection; 0: as many as it takes",
          .member = &Config::bytes_per_second_max,
          .least = 0,
          .most = std::uint64_t{1} << 40U},
+        {.key = "tileset_levels",
+         .help = "Levels of the quadtree of 3D Tiles, a multiple of 3: with 18 it is 2^17 chunks "
+                 "wide, each level less halves that, and clients come sooner to the ground; "
+                 "another number is another content id",
+         .member = &Config::tileset_levels,
+         .least = kSubtreeLevels,
+         .most = kTilesetLevels},
         {.key = "header_timeout_s",
          .help = "Seconds for a client's greeting, or a request's headers",
          .member = &Config::header_timeout_s,
@@ -188,7 +196,8 @@ ServerConfig::ServerConfig()
       sessions_max(kSessionsMax),
       sessions_per_address_max(kSessionsPerAddressMax),
       view_radius_max(kViewRadiusMax),
-      credit_window_bytes(kCreditWindowBytes) {}
+      credit_window_bytes(kCreditWindowBytes),
+      tileset_levels(kTilesetLevels) {}
 
 std::span<const Setting> settings() {
     static const std::vector<Setting> kSettings = all_settings();

@@ -39,6 +39,7 @@ struct ServerConfig {
     std::uint64_t credit_window_bytes;
     std::uint64_t requests_per_second_max = 0;
     std::uint64_t bytes_per_second_max = 0;
+    std::uint64_t tileset_levels;
     std::uint64_t header_timeout_s = 10;
     std::uint64_t stall_timeout_s = 30;
     std::uint64_t idle_timeout_s = 60;

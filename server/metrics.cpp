@@ -5,6 +5,8 @@
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
+#include <string_view>
 #include <utility>
 
 namespace terrane {
@@ -34,8 +36,6 @@ struct Metrics::Impl {
     prometheus::Histogram& generate = stages.Add({{"stage", "generate"}}, stage_buckets());
     prometheus::Histogram& mesh = stages.Add({{"stage", "mesh"}}, stage_buckets());
     prometheus::Histogram& encode = stages.Add({{"stage", "encode"}}, stage_buckets());
-    prometheus::Counter generated;
-    prometheus::Counter stored;
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
@@ -48,7 +48,6 @@ void Metrics::observe(const Result<Answer>& answer, std::chrono::microseconds qu
     if (chunk == nullptr) {
         return;
     }
-    (chunk->source == ChunkSource::generated ? impl_->generated : impl_->stored).Increment();
     const auto stage = [](prometheus::Histogram& histogram, std::uint32_t microseconds) {
         if (microseconds > 0) {
             histogram.Observe(seconds_of(microseconds));
@@ -57,11 +56,6 @@ void Metrics::observe(const Result<Answer>& answer, std::chrono::microseconds qu
     stage(impl_->generate, chunk->timings.generate_us);
     stage(impl_->mesh, chunk->timings.mesh_us);
     stage(impl_->encode, chunk->timings.encode_us);
-}
-
-std::uint64_t Metrics::made(ChunkSource source) const {
-    const auto& counter = source == ChunkSource::generated ? impl_->generated : impl_->stored;
-    return static_cast<std::uint64_t>(counter.Value());
 }
 
 std::string Metrics::text(const std::vector<MetricSample>& samples) const {
@@ -77,9 +71,12 @@ std::string Metrics::text(const std::vector<MetricSample>& samples) const {
             families.push_back(std::move(family));
         }
         prometheus::ClientMetric metric;
-        if (const std::size_t equals = sample.label.find('='); equals != std::string::npos) {
-            metric.label.push_back(
-                {sample.label.substr(0, equals), sample.label.substr(equals + 1)});
+        for (std::string_view rest = sample.labels; !rest.empty();) {
+            const std::string_view label = rest.substr(0, rest.find(','));
+            rest.remove_prefix(std::min(label.size() + 1, rest.size()));
+            const std::size_t equals = std::min(label.find('='), label.size());
+            metric.label.push_back({std::string(label.substr(0, equals)),
+                                    std::string(label.substr(std::min(equals + 1, label.size())))});
         }
         (is_counter ? metric.counter.value : metric.gauge.value) = sample.value;
         families.back().metric.push_back(std::move(metric));

@@ -19,7 +19,8 @@ struct MetricSample {
     std::string help;
     Kind kind = Kind::gauge;
     double value = 0;
-    std::string label = {};  ///< "outcome=busy"; empty: none. Samples of one name stand together.
+    /// "kind=chunk,outcome=busy"; empty: none. Samples of one name stand together.
+    std::string labels = {};
 };
 
 /// Any thread.
@@ -32,9 +33,6 @@ class Metrics {
 
     /// A worker has made an answer, or failed to, after the task had waited for `queued`.
     void observe(const Result<Answer>& answer, std::chrono::microseconds queued);
-
-    /// Chunks made so far, by where they came from (not the cache).
-    std::uint64_t made(ChunkSource source) const;
 
     std::string text(const std::vector<MetricSample>& samples) const;
 

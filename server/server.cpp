@@ -51,7 +51,7 @@ Result<std::unique_ptr<ChunkStore>> open_store(const ServerOptions& options, con
     return open_rocksdb_store(options.data_directory, identity, rocksdb);
 }
 
-ServerHello hello_of(const World& world) {
+ServerHello hello_of(const World& world, std::int32_t tileset_levels) {
     const WorldDefinition& definition = world.definition;
     ServerHello hello{.protocol_version = kProtocolVersion,
                       .server_version = kServerVersion,
@@ -59,7 +59,7 @@ ServerHello hello_of(const World& world) {
                       .encoding_version = kEncodingVersion,
                       .world_name = definition.name,
                       .fingerprint = world.fingerprint,
-                      .content_id = content_id_of(world),
+                      .content_id = served_content_id(content_id_of(world), tileset_levels),
                       .chunk_side = definition.grid.side,
                       .chunk_height = definition.grid.height,
                       .voxel_size_m = definition.grid.voxel_size_m,
@@ -122,6 +122,14 @@ Result<Doors> open_doors(const ServerOptions& options) {
         std::move(tokens));
     return doors;
 }
+
+constexpr std::array<std::pair<const char*, Counter OutcomeCounters::*>, 6> kOutcomes = {
+    {{"cache", &OutcomeCounters::cache},
+     {"store", &OutcomeCounters::store},
+     {"generated", &OutcomeCounters::generated},
+     {"busy", &OutcomeCounters::busy},
+     {"cancelled", &OutcomeCounters::cancelled},
+     {"failed", &OutcomeCounters::failed}}};
 
 constexpr const char* kNoRoom = "too many sessions are open";
 
@@ -216,7 +224,7 @@ struct Server::Impl {
                       };
                   }),
           sessions{.service = &service,
-                   .hello = hello_of(*world),
+                   .hello = hello_of(*world, options.tileset_levels),
                    .world_file = options.publish_world ? canonical_world_file(world->definition)
                                                        : std::string(),
                    .timeouts = options.timeouts,
@@ -224,11 +232,14 @@ struct Server::Impl {
                    .admit =
                        [this](const ClientHello& hello) {
                            return doors.admit(hello.token, sessions.caps);
-                       }},
+                       },
+                   .requests_log = options.log_requests ? &log : nullptr,
+                   .next_request_id = &next_request_id},
           routes{.service = &service,
                  .world = world.get(),
                  .hello = &sessions.hello,
                  .world_file = sessions.world_file,
+                 .tileset_levels = options.tileset_levels,
                  .is_ready = [this] { return !draining.load(); },
                  .metrics = [this] { return metrics.text(samples()); }},
           router(sessions.hello.content_id,
@@ -246,7 +257,15 @@ struct Server::Impl {
                .new_flow = [this] { return service.new_flow_id(); },
                .timeouts = options.http_timeouts,
                .websocket = websocket_upgrade(sessions),
-               .requests_log = options.log_requests ? &log : nullptr} {
+               .requests_log = options.log_requests ? &log : nullptr,
+               .rates_of =
+                   [this](std::string_view token) {
+                       // Who is not let in gets refusals, at the rate of everybody.
+                       const SessionCaps caps =
+                           clamped(doors.admit(token, sessions.caps).value_or(sessions.caps));
+                       return HttpRates{.requests_per_second_max = caps.requests_per_second_max,
+                                        .bytes_per_second_max = caps.bytes_per_second_max};
+                   }} {
         add_chunk_routes(router, routes);
         add_world_routes(router, routes);
         add_state_routes(router, routes);
@@ -301,12 +320,12 @@ std::vector<MetricSample> Server::Impl::samples() {
     using Kind = MetricSample::Kind;
     std::vector<MetricSample> out;
     const auto add = [&out](Kind kind, const char* name, const char* help, auto value,
-                            const char* label = "") {
+                            std::string labels = {}) {
         out.push_back({.name = name,
                        .help = help,
                        .kind = kind,
                        .value = static_cast<double>(value),
-                       .label = label});
+                       .labels = std::move(labels)});
     };
     const auto counter = [&add](const char* name, const char* help, const auto& value,
                                 const char* label = "") {
@@ -315,16 +334,16 @@ std::vector<MetricSample> Server::Impl::samples() {
     const auto gauge = [&add](const char* name, const char* help, auto value) {
         add(Kind::gauge, name, help, value);
     };
-    const char* const outcomes = "Chunk requests, by outcome";
-    const char* const requests = "terrane_requests_total";
-    add(Kind::counter, requests, outcomes, count_of(counters.cache_hits), "outcome=cache");
-    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::store), "outcome=store");
-    add(Kind::counter, requests, outcomes, metrics.made(ChunkSource::generated),
-        "outcome=generated");
-    add(Kind::counter, requests, outcomes, count_of(counters.busy), "outcome=busy");
-    add(Kind::counter, requests, outcomes, count_of(counters.cancelled), "outcome=cancelled");
-    add(Kind::counter, requests, outcomes, count_of(counters.failed), "outcome=failed");
+    for (std::size_t i = 0; i < kRequestKinds.size(); ++i) {
+        for (const auto& [outcome, member] : kOutcomes) {
+            add(Kind::counter, "terrane_requests_total", "Requests, by what was asked and outcome",
+                count_of(counters.outcomes[i].*member),
+                "kind=" + std::string(kRequestKinds[i]) + ",outcome=" + outcome);
+        }
+    }
     counter("terrane_generations_total", "Chunk stacks made", counters.generations);
+    counter("terrane_undelivered_total", "Answers that could not be handed on for want of memory",
+            counters.undelivered);
     counter("terrane_joins_total", "Requests that joined one in flight", counters.joins);
     counter("terrane_stack_hits_total", "Stacks found in memory", counters.stack_hits);
     gauge("terrane_queue_jobs", "Stacks that wait for a worker", service.queued_jobs());
@@ -344,7 +363,8 @@ std::vector<MetricSample> Server::Impl::samples() {
     add(Kind::counter, "terrane_store_failures_total", "Reads or writes that the disk refused",
         stats.failures);
     gauge("terrane_store_disk_bytes", "The store's tables", stats.disk_bytes);
-    gauge("terrane_store_memtable_bytes", "Written, and not yet in a table", stats.memtable_bytes);
+    gauge("terrane_store_memtable_bytes", "Written, and not yet in a table; all of a memory store",
+          stats.memtable_bytes);
     gauge("terrane_store_block_cache_bytes", "Blocks of tables in memory", stats.block_cache_bytes);
     gauge("terrane_store_pending_compaction_bytes", "What merging tables has yet to read",
           stats.pending_compaction_bytes);

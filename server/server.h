@@ -5,6 +5,7 @@
 #include "generator/terrain/world.h"
 #include "protocol/base/result.h"
 #include "server/chunks/counters.h"
+#include "server/http/tiles3d.h"
 #include "server/http/viewer_files.h"
 #include "server/log.h"
 #include "server/net/http_session.h"
@@ -34,12 +35,13 @@ struct ServerOptions {
     SessionTimeouts timeouts;
     HttpTimeouts http_timeouts = {};
     std::vector<ViewerFile> viewer_files = {};
-    SessionCaps caps = {};                     ///< of every session; clamped
-    bool publish_world = true;                 ///< clients may have the world file
-    std::optional<TlsServer::Files> tls = {};  ///< of both ports
-    std::filesystem::path token_file = {};     ///< empty: none
-    std::optional<bool> anonymous = {};        ///< default: if there is no token file
-    bool log_requests = false;                 ///< a debug line for each HTTP request
+    SessionCaps caps = {};                         ///< of every session; clamped
+    std::int32_t tileset_levels = kTilesetLevels;  ///< of 3D Tiles; a multiple of kSubtreeLevels
+    bool publish_world = true;                     ///< clients may have the world file
+    std::optional<TlsServer::Files> tls = {};      ///< of both ports
+    std::filesystem::path token_file = {};         ///< empty: none
+    std::optional<bool> anonymous = {};            ///< default: if there is no token file
+    bool log_requests = false;                     ///< a debug line for each request
     std::size_t workers = 1;
     std::size_t cache_bytes_max = std::size_t{256} << 20U;
     std::size_t stack_cache_bytes_max = std::size_t{64} << 20U;

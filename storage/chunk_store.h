@@ -46,9 +46,9 @@ struct StoreStats {
     std::uint64_t corrupt = 0;   ///< records found damaged (and treated as missing)
     std::uint64_t failures = 0;  ///< reads or writes the disk refused
     // What the database holds and has yet to do; 0 for a store that has no such thing.
-    std::uint64_t disk_bytes = 0;                ///< its tables
-    std::uint64_t memtable_bytes = 0;            ///< written, and not yet in a table
-    std::uint64_t block_cache_bytes = 0;         ///< tables' blocks in memory
+    std::uint64_t disk_bytes = 0;         ///< its tables
+    std::uint64_t memtable_bytes = 0;     ///< written, and not yet in a table; a memory store: all
+    std::uint64_t block_cache_bytes = 0;  ///< tables' blocks in memory
     std::uint64_t pending_compaction_bytes = 0;  ///< what its tables' merging has yet to read
     std::uint64_t stalled_writes = 0;            ///< 1 while it slows or stops writes to catch up
 };

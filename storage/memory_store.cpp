@@ -93,7 +93,12 @@ Result<void> MemoryStore::flush() {
 }
 
 StoreStats MemoryStore::stats() const {
-    return {.gets = gets_, .hits = hits_, .puts = puts_, .corrupt = corrupt_, .failures = 0};
+    return {.gets = gets_,
+            .hits = hits_,
+            .puts = puts_,
+            .corrupt = corrupt_,
+            .failures = 0,
+            .memtable_bytes = bytes()};
 }
 
 std::size_t MemoryStore::bytes() const {

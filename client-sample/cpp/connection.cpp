@@ -1,5 +1,7 @@
 #include "client-sample/cpp/connection.h"
 
+#include "client-sample/cpp/tls_peer.h"
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
@@ -55,31 +57,15 @@ struct Connection::Socket {
 
     Result<void> shake_hands(const std::string& host, const std::string& ca_file,
                              Deadline deadline) {
-        error_code error;
         tls_context.emplace(asio::ssl::context::tls_client);
-        SSL_CTX_set_min_proto_version(tls_context->native_handle(), TLS1_2_VERSION);
-        if (ca_file.empty()) {
-            tls_context->set_default_verify_paths(error);
-        } else {
-            tls_context->load_verify_file(ca_file, error);
-        }
-        if (error) {
-            return fail(ErrorCode::io_error,
-                        (ca_file.empty() ? "the system's certificates" : ca_file) +
-                            ": cannot be read: " + error.message());
+        if (auto trusted = demand_trust(tls_context->native_handle(), ca_file); !trusted) {
+            return trusted;
         }
         tls.emplace(socket, *tls_context);
-        tls->set_verify_mode(asio::ssl::verify_peer, error);
-        tls->set_verify_callback(asio::ssl::host_name_verification(host), error);
-        error_code no_address;
-        asio::ip::make_address(host, no_address);
-        if (no_address) {  // a name, which the server may have one certificate of several for
-            // What the macro SSL_set_tlsext_host_name does, without its cast.
-            std::string name = host;
-            SSL_ctrl(tls->native_handle(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name,
-                     name.data());
+        if (const auto named = demand_host(tls->native_handle(), host); !named) {
+            return failure(named.error().message);
         }
-        error_code outcome = error;
+        error_code outcome;
         tls->async_handshake(asio::ssl::stream_base::client,
                              [&](error_code shaken) { outcome = shaken; });
         if (!run_until(deadline, [this] { socket.cancel(); })) {

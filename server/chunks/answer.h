@@ -46,6 +46,7 @@ struct ColumnLimit {
 struct ServedColumn {
     ColumnPos column;
     std::shared_ptr<const std::vector<ColumnLimit>> limits;  ///< bottom first
+    ChunkSource source = ChunkSource::generated;             ///< never `cache`
 };
 
 /// A file that is no chunk: a tile of 3D Tiles (GLB), a map or a section (PNG).
@@ -55,6 +56,11 @@ struct ServedFile {
 };
 
 using Answer = std::variant<ServedChunk, ServedColumn, ServedFile>;
+
+inline ChunkSource source_of(const Answer& answer) {
+    return std::visit([](const auto& served) { return served.source; }, answer);
+}
+
 /// Called once, on a worker's thread or the caller's: must only hand the answer on.
 using AnswerCallback = std::function<void(const Result<Answer>&)>;
 

@@ -180,7 +180,9 @@ Result<Answer> ChunkBuilder::build_column(const Task& task, ColumnPos column) {
                            .flow = limit.flow,
                            .composition = stack.palette[limit.palette_id].composition});
     }
-    return ServedColumn{.column = column, .limits = std::move(limits)};
+    return ServedColumn{.column = column,
+                        .limits = std::move(limits),
+                        .source = in_hand->generated ? ChunkSource::generated : ChunkSource::store};
 }
 
 Result<ChunkBuilder::StackInHand> ChunkBuilder::stack_for(const Task& task, StackPos position) {

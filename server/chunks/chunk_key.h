@@ -45,6 +45,7 @@ struct TileKey {
 };
 
 /// One thing to make: a chunk, the limits of one level-0 column, a tile of 3D Tiles, a picture.
+/// kRequestKinds (counters.h) names them in this order.
 using WorkKey = std::variant<ChunkKey, ColumnPos, TileKey, MapTile, Section>;
 
 /// Where a key's job stands: work on one stack is one job, so that the stack is made once. Levels

@@ -32,6 +32,8 @@ bool fits_int32(std::int64_t value) {
            value <= std::numeric_limits<std::int32_t>::max();
 }
 
+static_assert(std::variant_size_v<WorkKey> == kRequestKinds.size());
+
 }  // namespace
 
 ChunkService::ChunkService(const ServiceOptions& options, ServiceCounters& counters,
@@ -67,7 +69,7 @@ Result<std::optional<Answer>> ChunkService::request(const WorkKey& wish, std::in
         in_flight_.admit(*key, stack_of(*key, options_.side_columns), priority, std::move(waiter));
     switch (admission.outcome) {
         case InFlight::Admitted::refused:
-            return busy("too many requests are in flight");
+            return busy(*key, "too many requests are in flight");
         case InFlight::Admitted::joined_key:
             raise(counters_.joins);
             queue_.raise(admission.job, admission.claim);
@@ -82,7 +84,7 @@ Result<std::optional<Answer>> ChunkService::request(const WorkKey& wish, std::in
         claim_again(admission.job);
         return std::optional<Answer>{};
     }
-    auto refused = busy("the work queue is full");
+    auto refused = busy(*key, "the work queue is full");
     for (const Waiter& other : in_flight_.abandon(admission.job)) {
         if (other.id != waiter_id) {  // those who joined in between
             other.answer(refused);
@@ -98,7 +100,7 @@ void ChunkService::cancel(const WorkKey& wish, WaiterId waiter) {
     }
     const auto left = in_flight_.leave(*key, waiter);
     if (left.stopped) {
-        raise(counters_.cancelled);
+        raise(outcomes_of(*key).cancelled);
     }
     if (left.idle_job) {
         queue_.remove(*left.idle_job);
@@ -239,14 +241,19 @@ void ChunkService::put_back(JobId job) {
 Result<Answer> ChunkService::run_task(const BuildStep& step, const Task& task) {
     const std::uint32_t queue_us = clamped_us(microseconds_since(task.asked));
     auto known = cached(task.key);  // finished between the asker's two looks
-    auto answer = known ? Result<Answer>(*std::move(known)) : build(step, task);
+    const bool is_known = known.has_value();
+    auto answer = is_known ? Result<Answer>(*std::move(known)) : build(step, task);
+    OutcomeCounters& outcomes = outcomes_of(task.key);
     if (!answer) {
         if (answer.error().code != ErrorCode::cancelled) {
-            raise(counters_.failed);
+            raise(outcomes.failed);
         }
         return answer;
     }
     raise(counters_.answers);
+    if (!is_known) {
+        raise(source_of(*answer) == ChunkSource::generated ? outcomes.generated : outcomes.store);
+    }
     try {  // before the waiters are taken: who misses the table from here on finds the cache
         if (auto* chunk = std::get_if<ServedChunk>(&*answer)) {
             chunk->timings.queue_us = queue_us;
@@ -265,7 +272,7 @@ void ChunkService::tell(const std::vector<Waiter>& waiters, const Result<Answer>
         try {
             waiter.answer(answer);
         } catch (const std::exception&) {
-            raise(counters_.failed);
+            raise(counters_.undelivered);
         }
     }
 }
@@ -285,7 +292,7 @@ std::optional<Answer> ChunkService::cached(const WorkKey& key) {
     if (!encoded) {
         return std::nullopt;
     }
-    raise(counters_.cache_hits);
+    raise(outcomes_of(key).cache);
     const auto* chunk = std::get_if<ChunkKey>(&key);
     if (chunk == nullptr) {
         return ServedFile{.file = std::move(encoded), .source = ChunkSource::cache};
@@ -294,8 +301,8 @@ std::optional<Answer> ChunkService::cached(const WorkKey& key) {
         .key = *chunk, .chunk = std::move(encoded), .source = ChunkSource::cache, .timings = {}};
 }
 
-tl::unexpected<Error> ChunkService::busy(const char* what) {
-    raise(counters_.busy);
+tl::unexpected<Error> ChunkService::busy(const WorkKey& key, const char* what) {
+    raise(outcomes_of(key).busy);
     return fail(ErrorCode::busy,
                 std::string(what) + "; try again in " + std::to_string(retry_after_ms()) + " ms");
 }

@@ -95,7 +95,10 @@ class ChunkService {
     Result<Answer> build(const BuildStep& step, const Task& task);
     void tell(const std::vector<Waiter>& waiters, const Result<Answer>& answer);
     std::optional<Answer> cached(const WorkKey& key);
-    tl::unexpected<Error> busy(const char* what);
+
+    OutcomeCounters& outcomes_of(const WorkKey& key) { return counters_.outcomes[key.index()]; }
+
+    tl::unexpected<Error> busy(const WorkKey& key, const char* what);
 
     const ServiceOptions options_;
     ServiceCounters& counters_;

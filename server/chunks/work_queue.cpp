@@ -117,7 +117,8 @@ void WorkQueue::charge(const JobTurn& turn, std::uint64_t cost_us) {
     guess_us_ = (guess_us_ * 7 + cost_us + 7) / 8;
     if (const auto found = flows_.find(turn.flow); found != flows_.end()) {
         Flow& flow = found->second;
-        const std::uint64_t used_us = flow.place.used_us + cost_us;
+        // A turn is never free: of two flows that have had as much, one would be served for ever.
+        const std::uint64_t used_us = flow.place.used_us + std::max<std::uint64_t>(cost_us, 1);
         place_again(flow, used_us - std::min(used_us, turn.charged_us));
     }
 }

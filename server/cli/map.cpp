@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <thread>
 
 namespace terrane {
 namespace {
@@ -68,8 +69,8 @@ int run_map(const MapOptions& options) {
     if (!world) {
         return kExitWrongUse;
     }
-    StackGenerator generator(*world);
-    const auto image = draw_map({.world = &*world, .generator = &generator}, *area);
+    const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
+    const auto image = draw_map(*world, *area, static_cast<std::int32_t>(cores));
     if (!image) {
         return wrong_use(image.error());
     }

@@ -9,6 +9,7 @@
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/config.h"
+#include "server/http/tiles3d.h"
 #include "server/server.h"
 
 #include <CLI/CLI.hpp>
@@ -205,6 +206,12 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
     options.data_directory = config.data;
     options.log_requests = config.log_level == "debug";
     options.publish_world = config.publish_world;
+    if (config.tileset_levels % kSubtreeLevels != 0) {
+        return fail(ErrorCode::invalid_argument,
+                    "--tileset-levels " + std::to_string(config.tileset_levels) +
+                        " is no multiple of " + std::to_string(kSubtreeLevels));
+    }
+    options.tileset_levels = static_cast<std::int32_t>(config.tileset_levels);
     options.workers = config.workers;
     options.cache_bytes_max = config.cache_mib << 20U;
     options.stack_cache_bytes_max = config.stack_cache_mib << 20U;
@@ -260,7 +267,7 @@ int serve_until_told(const ServerConfig& config, const ServerOptions& options, L
     (*server)->stop(std::chrono::seconds(config.drain_timeout_s));
     log.info("stopped", {{"generations", count_of((*server)->counters().generations)},
                          {"answers", count_of((*server)->counters().answers)},
-                         {"cache_hits", count_of((*server)->counters().cache_hits)},
+                         {"cache_hits", count_of((*server)->counters(), &OutcomeCounters::cache)},
                          {"store_failures", count_of((*server)->counters().store_failures)},
                          {"store_corrupt", count_of((*server)->counters().store_corrupt)}});
     return kExitDone;

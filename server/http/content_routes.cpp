@@ -182,17 +182,17 @@ void answer_section(const RouteContext& context, const HttpRequest& request,
 
 }  // namespace
 
-TilesetShape tileset_shape_of(const World& world) {
+TilesetShape tileset_shape_of(const World& world, std::int32_t levels) {
     const Grid& grid = world.definition.grid;
     return {.fingerprint = world.fingerprint,
-            .levels = levels_supported() / kSubtreeLevels * kSubtreeLevels,
+            .levels = levels,
             .side = grid.side,
             .voxel_size_m = grid.voxel_size_m,
             .height_voxels = tile_height_voxels(world)};
 }
 
 void add_tiles3d_routes(Router& router, const RouteContext& context) {
-    const TilesetShape shape = tileset_shape_of(*context.world);
+    const TilesetShape shape = tileset_shape_of(*context.world, context.tileset_levels);
     router.add_versioned(
         {.path = "/3dtiles/tileset.json", .handler = fixed(kJsonType, tileset_json(shape))});
     router.add_versioned({.path = "/3dtiles/tileset-geo.json",

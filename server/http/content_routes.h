@@ -15,7 +15,7 @@ inline constexpr std::int32_t kPicturePriority = -8;
 inline constexpr std::int64_t kSectionPixelsMax = std::int64_t{1} << 23;
 inline constexpr std::int64_t kSectionColumnsMax = 8192;
 
-TilesetShape tileset_shape_of(const World& world);
+TilesetShape tileset_shape_of(const World& world, std::int32_t levels);
 
 /// 3dtiles/tileset.json, tileset-geo.json, content, subtrees, explicit, all under the content id.
 void add_tiles3d_routes(Router& router, const RouteContext& context);

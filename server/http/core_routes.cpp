@@ -184,6 +184,7 @@ std::string world_json(const RouteContext& context, const std::string& versioned
                        {"chunk_height_voxels", hello.chunk_height},
                        {"voxel_size_m", hello.voxel_size_m},
                        {"levels", hello.levels},
+                       {"tileset_levels", context.tileset_levels},
                        {"bounds",
                         {{"height_voxels", hello.height_bound_voxels},
                          {"column_min", -kColumnMax},

@@ -6,7 +6,9 @@
 #include "protocol/wire/messages.h"
 #include "server/chunks/chunk_service.h"
 #include "server/http/router.h"
+#include "server/http/tiles3d.h"
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -17,7 +19,8 @@ struct RouteContext {
     ChunkService* service = nullptr;
     const World* world = nullptr;
     const ServerHello* hello = nullptr;
-    std::string world_file;                ///< canonical; empty: not published
+    std::string world_file;                        ///< canonical; empty: not published
+    std::int32_t tileset_levels = kTilesetLevels;  ///< of 3D Tiles (tiles3d.h)
     std::function<bool()> is_ready;        ///< the store is open, and nobody has said to stop
     std::function<std::string()> metrics;  ///< in Prometheus' text format
 };

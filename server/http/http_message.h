@@ -22,6 +22,7 @@ struct HttpRequest {
     std::string if_none_match;  ///< header values as sent; empty: not there
     std::string authorization;
     std::uint64_t id = 0;       ///< of this process; stands in logs and in `Terrane-Request`
+    std::uint64_t session = 0;  ///< the connection's number in logs
     std::uint64_t flow = 0;     ///< the connection's, for a fair share of the workers
     std::stop_token stop = {};  ///< the client has gone: nobody reads the answer
 };

@@ -111,6 +111,18 @@ Json explicit_tile(const TilesetShape& shape, const TileIndex& tile, std::int32_
 
 }  // namespace
 
+Hash128 served_content_id(Hash128 content_id, std::int32_t tileset_levels) {
+    if (tileset_levels == kTilesetLevels) {
+        return content_id;
+    }
+    Bytes bytes;
+    ByteWriter out(bytes);
+    out.fixed(content_id.high);
+    out.fixed(content_id.low);
+    out.fixed(tileset_levels);
+    return hash128(bytes);
+}
+
 Result<void> check_tile(const TilesetShape& shape, const TileIndex& tile) {
     if (tile.level < 0 || tile.level >= shape.levels) {
         return fail(ErrorCode::out_of_range, "level " + std::to_string(tile.level) +

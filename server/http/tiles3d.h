@@ -24,12 +24,19 @@ namespace terrane {
 
 /// Levels of a subtree file, and of an explicit tileset.
 inline constexpr std::int32_t kSubtreeLevels = 3;
+/// Of a quadtree, unless a setting says fewer: as many as can be generated, so that the tiles reach
+/// as far as the coordinates of 3D Tiles' clients do.
+inline constexpr std::int32_t kTilesetLevels = levels_supported() / kSubtreeLevels * kSubtreeLevels;
+
+/// What /v1/w/{W} names: the world, and the numbering of its tiles where that is not the usual. So
+/// no URL ever means two things, whatever a server is set to.
+Hash128 served_content_id(Hash128 content_id, std::int32_t tileset_levels);
 
 /// What the documents need to know of a world.
 struct TilesetShape {
     Hash128 fingerprint;
-    std::int32_t levels = 18;  ///< a multiple of kSubtreeLevels, at most levels_supported()
-    std::int32_t side = 32;    ///< columns of a stack
+    std::int32_t levels = kTilesetLevels;  ///< a multiple of kSubtreeLevels, at most that
+    std::int32_t side = 32;                ///< columns of a stack
     double voxel_size_m = 1;
     std::int32_t height_voxels = 0;  ///< a tile's box is y -1 .. height_voxels - 1
 };

@@ -1,6 +1,7 @@
 #include "server/net/http_session.h"
 
 #include "server/http/problem.h"
+#include "server/net/tokens.h"
 #include "server/net/websocket_frames.h"
 
 #include <algorithm>
@@ -176,6 +177,11 @@ void HttpSession::process(Clock::time_point now) {
             close_with("the server is shutting down");
             return;
         }
+        byte_rate_.refill(now);
+        if (!byte_rate_.has()) {
+            wake_at_ = byte_rate_.ready_at();
+            return;
+        }
         auto next = reader_.next();
         if (!next) {
             refuse(next.error());
@@ -196,6 +202,7 @@ void HttpSession::process(Clock::time_point now) {
 void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
     context_.counters->requests.fetch_add(1, std::memory_order_relaxed);
     received.request.id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
+    received.request.session = origin_.id;
     received.request.flow = flow_;
     received.request.stop = stop_.get_token();
     pending_ = std::make_shared<Pending>();
@@ -211,8 +218,19 @@ void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
         pending_->path = received.request.path;
     }
     const auto pending = pending_;
+    keep_to_rates_of(received.request);
+    request_rate_.refill(now);
+    if (!takes_request()) {
+        const std::string most = std::to_string(rates_.requests_per_second_max);
+        answer(*pending,
+               http_problem({.code = ErrorCode::busy,
+                             .message = most + " requests a second are the most for this session"},
+                            1000 / rates_.requests_per_second_max + 1));
+        return;
+    }
     if (received.request.path == context_.websocket.path && context_.websocket.make) {
         if (upgrades(received)) {
+            log_answer(*pending, 101, 0);
             pending_.reset();
             upgrade_ = std::move(received);
             return;
@@ -230,6 +248,37 @@ void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
     if (pending->at_once) {
         answer(*pending, *std::exchange(pending->at_once, std::nullopt));
     }
+}
+
+void HttpSession::keep_to_rates_of(const HttpRequest& request) {
+    if (!context_.rates_of) {
+        return;
+    }
+    std::string token = token_of(request.authorization, request.query);
+    if (token_ == token) {
+        return;
+    }
+    const bool is_first = !token_;
+    token_ = std::move(token);
+    rates_ = context_.rates_of(*token_);
+    const double requests = rates_.requests_per_second_max;
+    const auto bytes = static_cast<double>(rates_.bytes_per_second_max);
+    if (is_first) {  // full; but who shows one token after another has one bucket
+        request_rate_ = TokenBucket(requests, requests, request_since_);
+        byte_rate_ = TokenBucket(bytes, bytes / 4, request_since_);
+    } else {
+        request_rate_.set(requests, requests);
+        byte_rate_.set(bytes, bytes / 4);
+    }
+}
+
+/// Counts it against the client's rate; false if that is used up.
+bool HttpSession::takes_request() {
+    if (!request_rate_.has(1 - 1e-9)) {
+        return false;
+    }
+    request_rate_.take(1);
+    return true;
 }
 
 bool HttpSession::upgrades(const ReceivedRequest& received) {
@@ -250,25 +299,32 @@ void HttpSession::answer(const Pending& pending, HttpResponse response) {
         response.headers.emplace_back("Connection", "keep-alive");
     }
     const bool has_body = pending.method != "HEAD" && response.status != 304;
+    const std::size_t before_bytes = outbox_.bytes();
     outbox_.push(
         http_head(response, pending.id, keep_alive, http_date(std::chrono::system_clock::now())),
         has_body ? response.body : nullptr);
-    if (context_.requests_log != nullptr) {
-        const auto took =
-            std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
-        context_.requests_log->debug(
-            "http", {{"request", pending.id},
-                     {"session", origin_.id},
-                     {"method", pending.method},
-                     {"path", pending.path},
-                     {"status", std::uint64_t{response.status}},
-                     {"bytes", std::uint64_t{response.body ? response.body->size() : 0}},
-                     {"us", std::int64_t{took.count()}}});
-    }
+    byte_rate_.take(static_cast<double>(outbox_.bytes() - before_bytes));
+    log_answer(pending, response.status, response.body ? response.body->size() : 0);
     pending_.reset();
     if (!keep_alive) {
         close_with({});
     }
+}
+
+void HttpSession::log_answer(const Pending& pending, unsigned status,
+                             std::size_t body_bytes) const {
+    if (context_.requests_log == nullptr) {
+        return;
+    }
+    const auto took =
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
+    context_.requests_log->debug("http", {{"request", pending.id},
+                                          {"session", origin_.id},
+                                          {"method", pending.method},
+                                          {"path", pending.path},
+                                          {"status", std::uint64_t{status}},
+                                          {"bytes", std::uint64_t{body_bytes}},
+                                          {"us", std::int64_t{took.count()}}});
 }
 
 void HttpSession::refuse(const HttpFault& fault) {
@@ -277,6 +333,12 @@ void HttpSession::refuse(const HttpFault& fault) {
     const auto id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
     outbox_.push(http_head(response, id, false, http_date(std::chrono::system_clock::now())),
                  response.body);
+    if (context_.requests_log != nullptr) {
+        context_.requests_log->debug("http", {{"request", id},
+                                              {"session", origin_.id},
+                                              {"status", std::uint64_t{fault.status}},
+                                              {"fault", fault.detail}});
+    }
     close_with(std::string(to_string(ErrorCode::malformed)) + ": " + fault.detail);
 }
 
@@ -311,6 +373,10 @@ void HttpSession::written(std::size_t size_bytes, Clock::time_point now) {
 }
 
 void HttpSession::tick(Clock::time_point now) {
+    if (wake_at_ && *wake_at_ <= now) {
+        wake_at_.reset();
+        process(now);
+    }
     if (outbox_.empty()) {
         write_waits_since_.reset();
     } else if (!write_waits_since_) {
@@ -320,7 +386,7 @@ void HttpSession::tick(Clock::time_point now) {
         dead_ = true;
         return;
     }
-    if (closing_ || pending_ || !outbox_.empty()) {
+    if (closing_ || pending_ || wake_at_ || !outbox_.empty()) {
         return;
     }
     const HttpTimeouts& limits = context_.timeouts;
@@ -353,7 +419,7 @@ void HttpSession::end() {
 
 bool HttpSession::wants_input() const {
     return !closing_ && !dead_ && !upgrade_ && !input_ended_ && !outbox_.full() &&
-           (!pending_ || reader_.buffered_bytes() < kWaitingBytesMax);
+           ((!pending_ && !wake_at_) || reader_.buffered_bytes() < kWaitingBytesMax);
 }
 
 bool HttpSession::is_closing() const {

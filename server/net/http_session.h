@@ -2,6 +2,9 @@
 //
 //     idle ──first byte──> reading ──whole──> answering ──answer──> idle, or closing
 //
+// A client above its requests a second gets 429; one above its bytes a second is read again when
+// they have come back.
+//
 // The router makes the answers. One that it gives at once is written in the same step, by gather
 // write: the head is made here, the body is shared with the cache. One that comes later is posted
 // to the session's thread. Pipelined requests wait in the reader.
@@ -11,6 +14,7 @@
 #include "server/log.h"
 #include "server/net/byte_protocol.h"
 #include "server/net/http_reader.h"
+#include "server/net/token_bucket.h"
 
 #include <array>
 #include <atomic>
@@ -21,6 +25,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <string_view>
 
 namespace terrane {
 
@@ -47,6 +52,12 @@ struct WebSocketUpgrade {
         make;
 };
 
+/// What one connection may take; 0: no cap.
+struct HttpRates {
+    std::uint32_t requests_per_second_max = 0;
+    std::uint64_t bytes_per_second_max = 0;
+};
+
 /// What all HTTP sessions share; outlives them, and is used from any thread.
 struct HttpContext {
     const Router* router = nullptr;
@@ -56,6 +67,9 @@ struct HttpContext {
     HttpTimeouts timeouts;
     WebSocketUpgrade websocket;
     const Log* requests_log = nullptr;  ///< gets a line a request, if not null
+    /// Asked what the bearer of a token may take, when a connection shows another than before;
+    /// empty: no caps.
+    std::function<HttpRates(std::string_view token)> rates_of = {};
 };
 
 /// The head of an answer, up to and with the empty line: status, headers that all answers have, and
@@ -82,6 +96,9 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     bool wants_input() const override;
     bool is_closing() const override;
     bool is_dead() const override;
+
+    std::optional<Clock::time_point> wake_at() const override { return wake_at_; }
+
     std::string client_name() const override;
     std::string close_reason() const override;
     std::shared_ptr<ByteProtocol> take_successor() override;
@@ -91,7 +108,10 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
 
     void process(Clock::time_point now);
     void dispatch(ReceivedRequest received, Clock::time_point now);
+    void keep_to_rates_of(const HttpRequest& request);
+    bool takes_request();
     void answer(const Pending& pending, HttpResponse response);
+    void log_answer(const Pending& pending, unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);
     void close_with(std::string reason);
     bool upgrades(const ReceivedRequest& received);
@@ -114,6 +134,11 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     Clock::time_point request_since_;  ///< its first byte came
     bool had_request_ = false;
     std::optional<Clock::time_point> write_waits_since_;
+    std::optional<std::string> token_;  ///< the last that was shown; empty: none was
+    HttpRates rates_;
+    TokenBucket request_rate_;
+    TokenBucket byte_rate_;
+    std::optional<Clock::time_point> wake_at_;  ///< requests wait for the byte rate until then
 };
 
 /// `context` outlives what the factory makes.

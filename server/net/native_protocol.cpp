@@ -49,10 +49,10 @@ class NativeProtocol final : public ByteProtocol {
 }  // namespace
 
 ProtocolFactory native_protocol(const SessionContext& context) {
-    return [&context](const ConnectionOrigin&, ConnectionPost post,
+    return [&context](const ConnectionOrigin& origin, ConnectionPost post,
                       ByteProtocol::Clock::time_point now) {
-        return std::make_shared<NativeProtocol>(
-            std::make_shared<Session>(context, std::move(post), now));
+        return std::make_shared<NativeProtocol>(std::make_shared<Session>(
+            context, std::move(post), now, SessionOrigin{.id = origin.id}));
     };
 }
 

@@ -29,11 +29,13 @@ WireComposition wire_of(const Composition& composition) {
 
 }  // namespace
 
-Session::Session(const SessionContext& context, Post post, Clock::time_point now, std::string token)
+Session::Session(const SessionContext& context, Post post, Clock::time_point now,
+                 SessionOrigin origin)
     : context_(context),
       post_(std::move(post)),
       flow_(context.service->new_flow_id()),
-      token_(std::move(token)),
+      token_(std::move(origin.token)),
+      log_(context.requests_log, context.next_request_id, origin.id),
       caps_(clamped(context.caps)),
       byte_rate_(0, 0, now),
       request_rate_(request_rate_of(caps_, now)),
@@ -144,24 +146,26 @@ void Session::handle_one(const ClientHello& hello) {
 }
 
 /// Counts it against the client's rate; if that is used up, says so.
-bool Session::takes_request(std::uint32_t request_id) {
+bool Session::takes_request(std::uint32_t request_id, std::uint64_t number) {
     request_rate_.refill(now_);
     if (request_rate_.has(1 - 1e-9)) {
         request_rate_.take(1);
         return true;
     }
     const double wait_ms = 1000.0 / caps_.requests_per_second_max;
-    send(Failure{.request_id = request_id,
-                 .error = {.code = ErrorCode::busy,
-                           .message = std::to_string(caps_.requests_per_second_max) +
-                                      " requests a second are the most for this session"},
-                 .retry_after_ms = static_cast<std::uint32_t>(wait_ms) + 1,
-                 .key = std::nullopt});
+    send_failure(number, {.request_id = request_id,
+                          .error = {.code = ErrorCode::busy,
+                                    .message = std::to_string(caps_.requests_per_second_max) +
+                                               " requests a second are the most for this session"},
+                          .retry_after_ms = static_cast<std::uint32_t>(wait_ms) + 1,
+                          .key = std::nullopt});
+    log_.end(number);
     return false;
 }
 
 void Session::handle_one(const ChunkRequest& request) {
-    if (!takes_request(request.request_id)) {
+    const std::uint64_t number = log_.begin("chunks", request.request_id, request.keys.size());
+    if (!takes_request(request.request_id, number)) {
         return;
     }
     for (std::size_t i = 0; i < request.keys.size(); ++i) {
@@ -171,7 +175,8 @@ void Session::handle_one(const ChunkRequest& request) {
                              .without_flow = request.without_flow},
              .known_etag = request.known_etags.empty() ? Hash128{} : request.known_etags[i],
              .priority = std::clamp(request.priority, kPriorityMin, kPriorityMax) * kPriorityStep,
-             .rank = {}});
+             .rank = {},
+             .number = number});
     }
     submit();
 }
@@ -204,26 +209,32 @@ void Session::handle_one(const ChunkCancel& cancel) {
 }
 
 void Session::handle_one(const ColumnQuery& query) {
-    if (!takes_request(query.request_id)) {
+    const std::uint64_t number = log_.begin("column", query.request_id, 1);
+    if (!takes_request(query.request_id, number)) {
         return;
     }
     add({.request_id = query.request_id,
          .key = query.column,
          .known_etag = {},
          .priority = 0,
-         .rank = {}});
+         .rank = {},
+         .number = number});
     submit();
 }
 
 void Session::handle_one(const WorldQuery& query) {
-    if (!takes_request(query.request_id)) {
+    const std::uint64_t number = log_.begin("world", query.request_id, 1);
+    if (!takes_request(query.request_id, number)) {
         return;
     }
     if (context_.world_file.empty()) {
-        fail_request(query.request_id, {.code = ErrorCode::not_found,
-                                        .message = "this server does not publish its world file"});
+        fail_request(query.request_id,
+                     {.code = ErrorCode::not_found,
+                      .message = "this server does not publish its world file"},
+                     number);
         return;
     }
+    log_.answered(number, context_.world_file.size());
     send(WorldAnswer{.request_id = query.request_id,
                      .toml = context_.world_file,
                      .fingerprint = context_.hello.fingerprint});
@@ -247,6 +258,7 @@ void Session::handle_one(const Other& other) {
 
 void Session::add(Wish wish) {
     if (waiting_.size() + under_way_.size() - view_under_way_ >= caps_.keys_in_flight_max) {
+        raise(context_.service->counters().outcomes[wish.key.index()].busy);
         fail_wish(wish, {.code = ErrorCode::busy,
                          .message = std::to_string(caps_.keys_in_flight_max) +
                                     " keys of this session are in flight, which is the most"});
@@ -392,6 +404,7 @@ void Session::answer_chunk(const Wish& wish, const ServedChunk& served) {
                      .timings = served.timings,
                      .payload_bytes = 0,
                      .uniform = {}};
+    log_.answered(number_of(wish), is_known ? 0 : chunk.payload_bytes());
     if (is_known) {
         send(head);
         return;
@@ -407,6 +420,7 @@ void Session::answer_chunk(const Wish& wish, const ServedChunk& served) {
 }
 
 void Session::answer_column(const Wish& wish, const ServedColumn& column) {
+    log_.answered(number_of(wish), 0);
     ColumnAnswer message{.request_id = wish.request_id, .column = column.column, .limits = {}};
     message.limits.reserve(column.limits->size());
     for (const ColumnLimit& limit : *column.limits) {
@@ -430,14 +444,19 @@ void Session::fail_wish(const Wish& wish, Error error) {
     if (const auto* chunk = std::get_if<ChunkKey>(&wish.key)) {
         failure.key = chunk->position;
     }
-    send(failure);
+    send_failure(number_of(wish), failure);
 }
 
-void Session::fail_request(std::uint32_t request_id, Error error) {
-    send(Failure{.request_id = request_id,
-                 .error = std::move(error),
-                 .retry_after_ms = 0,
-                 .key = std::nullopt});
+void Session::fail_request(std::uint32_t request_id, Error error, std::uint64_t number) {
+    send_failure(number, {.request_id = request_id,
+                          .error = std::move(error),
+                          .retry_after_ms = 0,
+                          .key = std::nullopt});
+}
+
+void Session::send_failure(std::uint64_t number, const Failure& failure) {
+    log_.failed(number, failure);
+    send(failure);
 }
 
 void Session::close_with(Error error) {
@@ -512,6 +531,7 @@ void Session::end() {
     waiting_.clear();
     view_under_way_ = 0;
     view_.reset();
+    log_.end_all();
     stage_ = Stage::dead;
 }
 

@@ -17,10 +17,12 @@
 #include "protocol/wire/messages.h"
 #include "server/chunks/chunk_service.h"
 #include "server/net/outbox.h"
+#include "server/net/request_log.h"
 #include "server/net/session_caps.h"
 #include "server/net/token_bucket.h"
 #include "server/net/view.h"
 
+#include <atomic>
 #include <chrono>
 #include <compare>
 #include <cstddef>
@@ -64,6 +66,14 @@ struct SessionContext {
     /// Asked at each ClientHello what this client may do, or why it may not come in; empty:
     /// everybody may, with `caps`.
     std::function<Result<SessionCaps>(const ClientHello&)> admit = {};
+    const Log* requests_log = nullptr;  ///< gets a line a request and a Failure, if not null
+    std::atomic<std::uint64_t>* next_request_id = nullptr;  ///< of all ways in; goes with it
+};
+
+/// Where a session comes from.
+struct SessionOrigin {
+    std::uint64_t id = 0;    ///< the connection's; stands in logs
+    std::string token = {};  ///< shown to the transport already, for a ClientHello without one
 };
 
 /// All calls on one thread, the session's. Made by `std::make_shared`.
@@ -73,10 +83,9 @@ class Session : public std::enable_shared_from_this<Session> {
     /// Runs a function on the session's thread, some time later; callable from any thread.
     using Post = std::function<void(std::function<void()>)>;
 
-    /// `context` outlives the session. `token`: shown to the transport already, and used where the
-    /// ClientHello has none.
+    /// `context` outlives the session.
     Session(const SessionContext& context, Post post, Clock::time_point now,
-            std::string token = {});
+            SessionOrigin origin = {});
 
     /// Bytes from the client. All of them are kept, so call it only while `wants_input`.
     void receive(std::span<const std::byte> bytes, Clock::time_point now);
@@ -131,6 +140,7 @@ class Session : public std::enable_shared_from_this<Session> {
         Hash128 known_etag;         ///< zero: none
         std::int32_t priority = 0;  ///< as the service takes it
         Rank rank;                  ///< given by `add`
+        std::uint64_t number = 0;   ///< of its request, in the log; the view has its own
 
         bool is_of_view() const { return request_id == 0; }
     };
@@ -151,7 +161,7 @@ class Session : public std::enable_shared_from_this<Session> {
     template <typename Other>
     void handle_one(const Other& other);
 
-    bool takes_request(std::uint32_t request_id);
+    bool takes_request(std::uint32_t request_id, std::uint64_t number);
     void add(Wish wish);
     void submit();
     bool has_room() const;
@@ -175,7 +185,13 @@ class Session : public std::enable_shared_from_this<Session> {
     void answer_chunk(const Wish& wish, const ServedChunk& served);
     void answer_column(const Wish& wish, const ServedColumn& column);
     void fail_wish(const Wish& wish, Error error);
-    void fail_request(std::uint32_t request_id, Error error);
+    void fail_request(std::uint32_t request_id, Error error, std::uint64_t number = 0);
+
+    std::uint64_t number_of(const Wish& wish) const {
+        return wish.is_of_view() ? view_number_ : wish.number;
+    }
+
+    void send_failure(std::uint64_t number, const Failure& failure);
     void close_with(Error error);
     void send(const AnyMessage& message, SharedBytes payload = nullptr,
               std::optional<ChunkPos> of_view = std::nullopt);
@@ -185,6 +201,7 @@ class Session : public std::enable_shared_from_this<Session> {
     const Post post_;
     const FlowId flow_;
     const std::string token_;  ///< shown before the hello
+    RequestLog log_;
     SessionCaps caps_;
     Stage stage_ = Stage::hello;
     FrameReader reader_{kInboundFrameLimits};
@@ -195,7 +212,8 @@ class Session : public std::enable_shared_from_this<Session> {
     std::size_t expected_bytes_ = 4096;  ///< mean of the answers so far; the start is a guess
     bool goes_on_later_ = false;         ///< `submit` has been posted
     std::optional<View> view_;
-    ViewUpdate last_update_;  ///< without its radii
+    ViewUpdate last_update_;         ///< without its radii
+    std::uint64_t view_number_ = 0;  ///< of the last ViewUpdate, in the log
     std::size_t view_under_way_ = 0;
     std::size_t uncredited_bytes_ = 0;
     bool is_stalled_ = false;  ///< its next wish waits for credit

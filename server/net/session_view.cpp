@@ -2,6 +2,7 @@
 #include "server/net/session.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -21,18 +22,26 @@ bool is_same_kind(const ViewUpdate& a, const ViewUpdate& b) {
 }  // namespace
 
 void Session::handle_one(const ViewUpdate& update) {
-    if (!takes_request(0)) {
+    // It has as many answers as there are chunks; the next view is the end of them.
+    const std::uint64_t number = log_.begin("view", 0, std::numeric_limits<std::size_t>::max());
+    if (!takes_request(0, number)) {
         return;
     }
     if (caps_.view_radius_max == 0) {
-        fail_request(0, {.code = ErrorCode::unsupported,
-                         .message = "this server gives no views; ask for chunks by their keys"});
+        fail_request(0,
+                     {.code = ErrorCode::unsupported,
+                      .message = "this server gives no views; ask for chunks by their keys"},
+                     number);
+        log_.end(number);
         return;
     }
     if (update.format == ChunkFormat::draco_blocky && update.radius_chunks.size() > 1) {
-        fail_request(0, {.code = ErrorCode::unsupported,
-                         .message = "a view of several levels as blocky: only level 0 has blocks; "
-                                    "give one radius, or ask for draco"});
+        fail_request(0,
+                     {.code = ErrorCode::unsupported,
+                      .message = "a view of several levels as blocky: only level 0 has blocks; "
+                                 "give one radius, or ask for draco"},
+                     number);
+        log_.end(number);
         return;
     }
     if (!view_) {
@@ -44,6 +53,7 @@ void Session::handle_one(const ViewUpdate& update) {
                       .levels = world.levels},
             ViewBounds{.radius_max = caps_.view_radius_max, .squares_max = caps_.view_squares_max});
     }
+    log_.end(std::exchange(view_number_, number));
     view_->update(update);
     const bool all_again = !is_same_kind(update, last_update_);
     last_update_ = update;
@@ -108,6 +118,7 @@ void Session::end_view() {
     });
     view_under_way_ = 0;
     view_.reset();
+    log_.end(std::exchange(view_number_, 0));
 }
 
 /// Before anything else of the view is sent: who wants a chunk again must have been told that it

@@ -305,7 +305,9 @@ WebSocketUpgrade websocket_upgrade(const SessionContext& context) {
                 auto protocol = std::make_shared<WebSocketProtocol>(
                     std::make_shared<Session>(
                         context, std::move(post), now,
-                        token_of(request.request.authorization, request.request.query)),
+                        SessionOrigin{.id = request.request.session,
+                                      .token = token_of(request.request.authorization,
+                                                        request.request.query)}),
                     websocket_handshake(request.websocket_key));
                 protocol->receive(rest, now);
                 return protocol;

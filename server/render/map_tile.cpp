@@ -2,10 +2,17 @@
 
 #include "generator/volume/color.h"
 #include "generator/volume/water.h"
+#include "protocol/base/mutex.h"
 #include "server/render/relief.h"
 
 #include <algorithm>
+#include <atomic>
+#include <exception>
+#include <limits>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace terrane {
@@ -118,6 +125,64 @@ Result<void> sample(Relief& relief, const Drawing& drawing, ColumnPos first, std
     return {};
 }
 
+std::int32_t blocks_along(std::int32_t pixels) {
+    return (pixels + kBlockPixels - 1) / kBlockPixels;
+}
+
+std::int32_t blocks_of(const MapArea& area) {
+    return blocks_along(area.width) * blocks_along(area.height);
+}
+
+/// Blocks are numbered row by row, 0..blocks_of - 1; none looks at another's pixels.
+Result<void> draw_block(Image& image, const Drawing& drawing, const MapArea& area,
+                        std::int32_t block) {
+    const std::int32_t x = block % blocks_along(area.width) * kBlockPixels;
+    const std::int32_t y = block / blocks_along(area.width) * kBlockPixels;
+    Relief relief;
+    // Four samples a pixel, but where a pixel is a column.
+    relief.detail = area.lod > 0 ? 1 : 0;
+    relief.step_voxels = static_cast<float>(std::int64_t{1} << (area.lod - relief.detail));
+    relief.bound_voxels = static_cast<float>(std::max(1.0, drawing.world->stack.height_bound));
+    relief.width = std::min(kBlockPixels, area.width - x);
+    relief.height = std::min(kBlockPixels, area.height - y);
+    const ColumnPos first{.x = area.first.x + (std::int64_t{x} << area.lod),
+                          .z = area.first.z + (std::int64_t{y} << area.lod)};
+    if (auto made = sample(relief, drawing, first, area.lod); !made) {
+        return made;
+    }
+    shade_relief(image, x, y, relief);
+    return {};
+}
+
+/// What the threads of one map share.
+struct BlockQueue {
+    std::atomic<std::int32_t> next = 0;
+    Mutex mutex;
+    std::optional<Error> failure TERRANE_GUARDED_BY(mutex);
+
+    /// Ends the others after the blocks that they are at.
+    void fail_with(Error error) {
+        next = std::numeric_limits<std::int32_t>::max() / 2;
+        const MutexLock lock(mutex);
+        failure = failure ? std::move(failure) : std::move(error);
+    }
+};
+
+void draw_blocks(Image& image, BlockQueue& queue, const World& world, const MapArea& area) {
+    try {
+        StackGenerator generator(world);
+        const Drawing drawing{.world = &world, .generator = &generator};
+        for (std::int32_t block = queue.next++; block < blocks_of(area); block = queue.next++) {
+            if (auto drawn = draw_block(image, drawing, area, block); !drawn) {
+                queue.fail_with(drawn.error());
+                return;
+            }
+        }
+    } catch (const std::exception& error) {
+        queue.fail_with({.code = ErrorCode::internal, .message = error.what()});
+    }
+}
+
 }  // namespace
 
 Result<void> check_map_tile(const MapTile& tile) {
@@ -146,23 +211,33 @@ Result<Image> draw_map(const Drawing& drawing, const MapArea& area) {
     if (!image) {
         return image;
     }
-    const World& world = *drawing.world;
-    Relief relief;
-    // Four samples a pixel, but where a pixel is a column.
-    relief.detail = area.lod > 0 ? 1 : 0;
-    relief.step_voxels = static_cast<float>(std::int64_t{1} << (area.lod - relief.detail));
-    relief.bound_voxels = static_cast<float>(std::max(1.0, world.stack.height_bound));
-    for (std::int32_t y = 0; y < area.height; y += kBlockPixels) {
-        for (std::int32_t x = 0; x < area.width; x += kBlockPixels) {
-            relief.width = std::min(kBlockPixels, area.width - x);
-            relief.height = std::min(kBlockPixels, area.height - y);
-            const ColumnPos first{.x = area.first.x + (std::int64_t{x} << area.lod),
-                                  .z = area.first.z + (std::int64_t{y} << area.lod)};
-            if (auto made = sample(relief, drawing, first, area.lod); !made) {
-                return tl::unexpected(made.error());
-            }
-            shade_relief(*image, x, y, relief);
+    for (std::int32_t block = 0; block < blocks_of(area); ++block) {
+        if (auto drawn = draw_block(*image, drawing, area, block); !drawn) {
+            return tl::unexpected(drawn.error());
         }
+    }
+    return image;
+}
+
+Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads) {
+    auto image = make_image(area.width, area.height);
+    if (!image) {
+        return image;
+    }
+    BlockQueue queue;
+    {
+        std::vector<std::jthread> workers;
+        try {
+            for (std::int32_t i = 0; i < std::min(threads, blocks_of(area)); ++i) {
+                workers.emplace_back([&] { draw_blocks(*image, queue, world, area); });
+            }
+        } catch (const std::exception& error) {
+            queue.fail_with({.code = ErrorCode::internal, .message = error.what()});
+        }
+    }
+    const MutexLock lock(queue.mutex);
+    if (queue.failure) {
+        return tl::unexpected(*queue.failure);
     }
     return image;
 }

@@ -37,6 +37,10 @@ struct MapArea {
 /// make_image's limits, `out_of_range` when a column is, `cancelled` when the drawing is stopped.
 Result<Image> draw_map(const Drawing& drawing, const MapArea& area);
 
+/// The same with `threads` >= 1 threads that share the blocks of the picture; the pixels do not
+/// depend on how many. `internal`: there is no memory or no such thread.
+Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads);
+
 Result<Image> draw_map_tile(const Drawing& drawing, const MapTile& tile);
 
 }  // namespace terrane

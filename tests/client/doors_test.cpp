@@ -1,6 +1,8 @@
 // Who gets into a server and how: TLS and tokens on both ports, tried by the client library, by
 // openssl and by curl.
 #include "client-sample/cpp/client.h"
+#include "client-sample/cpp/program/load.h"
+#include "client-sample/cpp/program/program.h"
 #include "protocol/wire/frame.h"
 #include "protocol/wire/limits.h"
 #include "protocol/wire/messages.h"
@@ -189,6 +191,69 @@ TEST_F(Doors, CloseOnWhoDoesNotShakeHands) {
     }
 }
 
+/// A small load: three viewers for a moment.
+LoadOptions small_load(const Server& server, CarrierKind carrier) {
+    LoadOptions options;
+    options.host = "127.0.0.1";
+    options.port =
+        carrier == CarrierKind::tcp ? server.endpoint().port : server.http_endpoint()->port;
+    options.carrier = carrier;
+    options.clients = 3;
+    options.seconds = 0.3;
+    options.ramp_seconds = 0;
+    options.check_every = 10;
+    options.client.radius_chunks = {1};
+    options.client.by_view = carrier != CarrierKind::http;
+    options.client.patience = 20s;
+    return options;
+}
+
+constexpr std::array kCarriers = {CarrierKind::tcp, CarrierKind::web_socket, CarrierKind::http};
+
+TEST_F(Doors, LoadComesInByTlsOnAllWays) {
+    make_certificate("first");
+    const auto server = start(tls_options());
+    ASSERT_TRUE(server);
+    for (const CarrierKind carrier : kCarriers) {
+        LoadOptions options = small_load(*server, carrier);
+        options.tls = {.enabled = true, .ca_file = path("cert.pem")};
+        const auto result = run_load(options, [](const std::string&) {});
+        ASSERT_TRUE(result) << result.error().message;
+        EXPECT_TRUE(result->is_good()) << load_text(*result);
+        EXPECT_GE(result->chunks, 3U * 9U) << load_text(*result);
+        EXPECT_GT(result->checked, 0U) << load_text(*result);
+    }
+    for (const TlsUse& tls :
+         {TlsUse{}, TlsUse{.enabled = true}}) {  // the system trusts nobody here
+        LoadOptions options = small_load(*server, CarrierKind::tcp);
+        options.tls = tls;
+        const auto result = run_load(options, [](const std::string&) {});
+        ASSERT_TRUE(result) << result.error().message;
+        EXPECT_EQ(result->disconnected, 3U) << load_text(*result);
+        EXPECT_EQ(result->chunks, 0U);
+    }
+    LoadOptions options = small_load(*server, CarrierKind::tcp);
+    options.tls = {.enabled = true, .ca_file = path("missing.pem")};
+    const auto result = run_load(options, [](const std::string&) {});
+    ASSERT_FALSE(result);
+    EXPECT_THAT(result.error().message, HasSubstr("missing.pem"));
+}
+
+TEST_F(Doors, LoadTakesTheFlagsOfTls) {
+    make_certificate("first");
+    const auto server = start(tls_options());
+    ASSERT_TRUE(server);
+    const std::string at = "127.0.0.1:" + std::to_string(server->endpoint().port);
+    const std::string ca = path("cert.pem");
+    std::vector<const char*> arguments = {
+        "terrane-client", "load", "--server", at.c_str(), "--clients", "1", "--seconds", "0.2",
+        "--radius",       "1",    "--tls",    "--ca",     ca.c_str()};
+    EXPECT_EQ(run_client_program(static_cast<int>(arguments.size()), arguments.data()), 0);
+    arguments.resize(arguments.size() - 2);
+    EXPECT_EQ(run_client_program(static_cast<int>(arguments.size()), arguments.data()), 1)
+        << "a certificate that nobody signed";
+}
+
 /// A server that wants tokens: "right" is good, "late" has expired.
 class TokenDoors : public Doors {
   protected:
@@ -281,6 +346,21 @@ TEST_F(TokenDoors, LetGoodTokensInOnAllWaysAndNoOthers) {
     const auto metrics = http.get("/metrics");
     ASSERT_TRUE(metrics);
     EXPECT_EQ(metrics->status, 401U);
+}
+
+TEST_F(TokenDoors, LetALoadInByItsToken) {
+    for (const CarrierKind carrier : kCarriers) {
+        LoadOptions options = small_load(*server_, carrier);
+        options.client.token = "right";
+        const auto good = run_load(options, [](const std::string&) {});
+        ASSERT_TRUE(good) << good.error().message;
+        EXPECT_TRUE(good->is_good()) << load_text(*good);
+        EXPECT_GE(good->chunks, 3U * 9U);
+        options.client.token = "wrong";
+        const auto bad = run_load(options, [](const std::string&) {});
+        ASSERT_TRUE(bad) << bad.error().message;
+        EXPECT_EQ(bad->disconnected, 3U) << load_text(*bad);
+    }
 }
 
 TEST_F(TokenDoors, ReadTheFileAgain) {

@@ -4,13 +4,14 @@
 //         the program, the folder of the shipped worlds, and which of them
 //
 // Quick: every kind of tile of one world through gltf-validator, three + 3d-tiles-renderer and
-// loaders.gl. `--all`: more worlds, and CesiumJS too. Screenshots are left in ./screenshots.
+// loaders.gl (its loaders, and its Tileset3D). `--all`: more worlds, and CesiumJS too. Screenshots are left in ./screenshots.
 import { mkdir } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { startPages, startTerrane } from './server.mjs';
 import { validateTiles } from './glb_valid.mjs';
 import { walkExplicit } from './loaders_gl.mjs';
+import { traverse } from './tileset3d.mjs';
 import { makePages, openBrowser, see } from './pages.mjs';
 
 const [program, worlds, ...flags] = process.argv.slice(2);
@@ -121,6 +122,22 @@ async function checkWorld(name, browser, pages) {
             expect(seen.tiles >= 20 && seen.triangles > 10000, JSON.stringify(seen));
             return `${seen.tiles} of ${seen.wanted} tiles of levels `
                 + `${[...seen.levels].sort((a, b) => a - b)}, ${seen.triangles} triangles`;
+        });
+        await check(`${name}: loaders.gl, Tileset3D`, async () => {
+            const state = await traverse(`${terrane.content}/3dtiles/explicit/tileset-geo.json`, view,
+                { errorTarget: 12, roundsMax: 4000 });
+            expect(state.errors.length === 0, JSON.stringify(state.errors.slice(0, 8), null, 1));
+            expect(state.done, `no rest after ${state.rounds} traversals`);
+            expect(state.visible >= 10, `only ${state.visible} tiles are visible`);
+            expect(state.levels.length >= 4, `only levels ${state.levels}`);
+            expect(state.levels.includes(terrane.world.levels - 1), 'no volume is underfoot');
+            expect(state.overlaps === 0, `${state.overlaps} tiles are shown beside their parents`);
+            expect(state.uncovered === 0, `${state.uncovered} points of the ground have no tile`);
+            expect(state.draco && state.vertices > 10000, `${state.vertices} vertices`);
+            // Lazy: of 4^17 tiles it has heard of those on the way only.
+            expect(state.headers < 50000, `${state.headers} tiles are known`);
+            return `${state.visible} tiles visible of levels ${state.levels.join(',')}, `
+                + `${state.documents} documents, ${state.headers} tiles known, 0 errors`;
         });
         if (all) {
             await check(`${name}: Cesium`, async () => {

@@ -2,8 +2,8 @@
 // However they are cut, the same data and control frames must come out.
 #include "protocol/base/check.h"
 #include "server/net/websocket_frames.h"
+#include "tests/fuzz/in_pieces.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,36 +19,33 @@ struct Read {
     bool is_whole = true;
 };
 
-Read read(std::span<const std::byte> bytes, std::size_t piece) {
+Read read_pieces(std::span<const std::byte> bytes, std::size_t piece_bytes) {
     Read read;
     WebSocketReader reader;
-    for (std::size_t at = 0; at < bytes.size() && read.is_whole; at += piece) {
-        read.is_whole = reader
-                            .feed(read.data, read.control,
-                                  bytes.subspan(at, std::min(piece, bytes.size() - at)))
-                            .has_value();
-    }
+    in_pieces(bytes, piece_bytes, [&](std::span<const std::byte> piece) {
+        read.is_whole = reader.feed(read.data, read.control, piece).has_value();
+        return read.is_whole;
+    });
     return read;
+}
+
+void compare(const Read& pieces, const Read& whole, std::size_t size_bytes) {
+    TERRANE_ASSERT(whole.data.size() <= size_bytes);
+    if (!whole.is_whole) {  // the limit on control frames is one of a single read
+        return;
+    }
+    TERRANE_ASSERT(pieces.is_whole && pieces.data == whole.data &&
+                   pieces.control.size() == whole.control.size());
+    for (std::size_t i = 0; i < whole.control.size(); ++i) {
+        TERRANE_ASSERT(pieces.control[i].opcode == whole.control[i].opcode &&
+                       pieces.control[i].payload == whole.control[i].payload &&
+                       pieces.control[i].size_bytes == whole.control[i].size_bytes);
+    }
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    if (size == 0) {
-        return 0;
-    }
-    const auto bytes = std::as_bytes(std::span(data, size)).subspan(1);
-    const Read pieces = read(bytes, std::size_t{1} + data[0]);
-    const Read whole = read(bytes, bytes.size() + 1);
-    TERRANE_ASSERT(whole.data.size() <= bytes.size());
-    if (whole.is_whole) {  // the limit on control frames is one of a single read
-        TERRANE_ASSERT(pieces.is_whole && pieces.data == whole.data &&
-                       pieces.control.size() == whole.control.size());
-        for (std::size_t i = 0; i < whole.control.size(); ++i) {
-            TERRANE_ASSERT(pieces.control[i].opcode == whole.control[i].opcode &&
-                           pieces.control[i].payload == whole.control[i].payload &&
-                           pieces.control[i].size_bytes == whole.control[i].size_bytes);
-        }
-    }
+    read_both_ways(data, size, read_pieces, compare);
     return 0;
 }

@@ -93,7 +93,7 @@ TEST(ChunkService, AnswersByCallbackAndThenFromTheCache) {
     const auto second = f.request(chunk(1));
     ASSERT_TRUE(second && *second);
     EXPECT_EQ(std::get<ServedChunk>(**second).source, ChunkSource::cache);
-    EXPECT_EQ(count_of(f.counters.cache_hits), 1U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cache), 1U);
     EXPECT_EQ(f.gate.builds, 1);
 }
 
@@ -146,9 +146,9 @@ TEST(ChunkService, TheLastToCancelStopsTheJob) {
     ASSERT_TRUE(f.request(chunk(1)));
     f.gate.begun.acquire();
     f.service->cancel(chunk(1), first);
-    EXPECT_EQ(count_of(f.counters.cancelled), 0U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 0U);
     f.service->cancel(chunk(1), f.last_id);
-    EXPECT_EQ(count_of(f.counters.cancelled), 1U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
     EXPECT_EQ(f.service->in_flight(), 0U);
     ASSERT_TRUE(f.request(chunk(2)));
     f.gate.passes.release(2);
@@ -194,7 +194,7 @@ TEST(ChunkService, IsBusyWhenTheQueueIsFull) {
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::busy);
     EXPECT_GE(f.service->retry_after_ms(), 20U);
-    EXPECT_EQ(count_of(f.counters.busy), 1U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::busy), 1U);
     EXPECT_TRUE(f.request(chunk(3))) << "joining needs no room in the queue";
     f.gate.passes.release(3);
     f.inbox.wait(4);
@@ -268,7 +268,7 @@ TEST(ChunkService, AJobIsServedForWhoIsLeftWhenItsMostUrgentLeaves) {
     ASSERT_TRUE(f.request(chunk(2), 0, 2));
     ASSERT_TRUE(f.request(chunk(3), 5, 2));
     f.service->cancel(chunk(2), urgent);
-    EXPECT_EQ(count_of(f.counters.cancelled), 0U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 0U);
     f.gate.passes.release(3);
     EXPECT_EQ(f.answered(3), (std::vector<std::int32_t>{1, 3, 2}));
 }
@@ -318,7 +318,7 @@ TEST(ChunkService, AnExceptionFailsOneTaskOnly) {
     const auto answers = f.inbox.wait(1);
     ASSERT_FALSE(answers[0]);
     EXPECT_EQ(answers[0].error().code, ErrorCode::internal);
-    EXPECT_EQ(count_of(f.counters.failed), 1U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::failed), 1U);
     ASSERT_TRUE(f.request(chunk(1, 1)));
     EXPECT_TRUE(f.inbox.wait(2)[1]);
 }

@@ -37,7 +37,9 @@ std::shared_ptr<const World> textured_world() {
 }
 
 struct Running {
-    explicit Running(const std::filesystem::path& data = {}) {
+    explicit Running(const std::filesystem::path& data = {},
+                     std::int32_t tileset_levels = kTilesetLevels) {
+        options.tileset_levels = tileset_levels;
         options.world = textured_world();
         options.listen.endpoint = {.address = "127.0.0.1", .port = 0};
         options.http = Endpoint{.address = "127.0.0.1", .port = 0};
@@ -51,7 +53,8 @@ struct Running {
             std::abort();
         }
         server = *std::move(started);
-        prefix = "/v1/w/" + to_hex(content_id_of(*options.world));
+        prefix =
+            "/v1/w/" + to_hex(served_content_id(content_id_of(*options.world), tileset_levels));
         client = std::make_unique<HttpClient>(server->http_endpoint()->port);
     }
 
@@ -89,6 +92,23 @@ std::vector<std::string> described_urls(const Running& r) {
         urls.push_back(url);
     }
     return urls;
+}
+
+TEST(ContentRoutes, ASmallerTilesetHasOtherUrlsAndTheSameGround) {
+    const Running usual;
+    const Running small({}, 9);
+    EXPECT_NE(usual.prefix, small.prefix) << "no URL means two things";
+    EXPECT_EQ(small.get(usual.prefix + "/3dtiles/tileset.json").status, 404U);
+    EXPECT_EQ(Json::parse(small.get("/v1/world").body)["tileset_levels"], 9);
+    const Json root = Json::parse(small.content("/3dtiles/tileset.json").body)["root"];
+    EXPECT_EQ(root["implicitTiling"]["availableLevels"], 9);
+    EXPECT_EQ(small.content("/3dtiles/content/0/0/0.glb").status, 200U);
+    EXPECT_EQ(small.content("/3dtiles/content/9/0/0.glb").status, 400U);
+    EXPECT_EQ(small.content("/3dtiles/subtrees/6/31/32.subtree").status, 200U);
+    // The leaf south east of the origin.
+    const HttpReply leaf = small.content("/3dtiles/content/8/128/127.glb");
+    EXPECT_EQ(leaf.status, 200U);
+    EXPECT_EQ(leaf.body, usual.content("/3dtiles/content/17/65536/65535.glb").body);
 }
 
 TEST(OpenApi, DescribesEveryRouteOfTheTableAndNoOther) {

@@ -33,7 +33,8 @@ struct Gate {
                 }
                 if (const auto* column = std::get_if<ColumnPos>(&task.key)) {
                     return ServedColumn{.column = *column,
-                                        .limits = std::make_shared<std::vector<ColumnLimit>>(3)};
+                                        .limits = std::make_shared<std::vector<ColumnLimit>>(3),
+                                        .source = ChunkSource::generated};
                 }
                 const auto key = std::get<ChunkKey>(task.key);
                 if (key.position.y == 666) {

@@ -146,18 +146,35 @@ TEST(HttpServer, CountsWhatItDoes) {
     ASSERT_TRUE(client.get(chunk));
     ASSERT_TRUE(client.get(chunk));
     ASSERT_TRUE(client.get("/nothing"));
+    for (const char* path :
+         {"/map/18/131072/131072.png", "/map/18/131072/131072.png", "/sections/0,0/40,0.png",
+          "/columns/4/4.json", "/3dtiles/content/17/65536/65536.glb",
+          "/3dtiles/content/17/65536/65536.glb", "/chunks/99/0/0/0.drc"}) {
+        ASSERT_TRUE(client.get(r.prefix + path)) << path;
+    }
     const auto reply = client.get("/metrics");
     ASSERT_TRUE(reply);
     EXPECT_EQ(reply->header("content-type"), "text/plain; version=0.0.4; charset=utf-8");
-    for (const char* line :
-         {"terrane_requests_total{outcome=\"cache\"} 1\n",
-          "terrane_requests_total{outcome=\"generated\"} 1\n", "terrane_generations_total 1\n",
-          "terrane_stage_seconds_count{stage=\"queue\"} 1\n",
-          "terrane_stage_seconds_count{stage=\"generate\"} 1\n", "terrane_sessions 1\n",
-          "terrane_http_answers_total{status=\"2xx\"} 2\n",
-          "terrane_http_answers_total{status=\"4xx\"} 1\n", "terrane_queue_jobs 0\n",
-          "terrane_oldest_in_flight_seconds 0\n", "terrane_credit_stalls_total 0\n",
-          "# TYPE terrane_sent_bytes_total counter\n"}) {
+    for (const char* line : {"terrane_requests_total{kind=\"chunk\",outcome=\"cache\"} 1\n",
+                             "terrane_requests_total{kind=\"chunk\",outcome=\"generated\"} 1\n",
+                             "terrane_requests_total{kind=\"chunk\",outcome=\"failed\"} 0\n",
+                             "terrane_requests_total{kind=\"map\",outcome=\"generated\"} 1\n",
+                             "terrane_requests_total{kind=\"map\",outcome=\"cache\"} 1\n",
+                             "terrane_requests_total{kind=\"section\",outcome=\"generated\"} 1\n",
+                             "terrane_requests_total{kind=\"section\",outcome=\"cache\"} 0\n",
+                             "terrane_requests_total{kind=\"column\",outcome=\"generated\"} 1\n",
+                             "terrane_requests_total{kind=\"tile\",outcome=\"generated\"} 1\n",
+                             "terrane_requests_total{kind=\"tile\",outcome=\"cache\"} 1\n",
+                             "terrane_requests_total{kind=\"tile\",outcome=\"busy\"} 0\n",
+                             "terrane_stage_seconds_count{stage=\"queue\"} 5\n",
+                             "terrane_stage_seconds_count{stage=\"generate\"} 1\n",
+                             "terrane_sessions 1\n",
+                             "terrane_http_answers_total{status=\"2xx\"} 8\n",
+                             "terrane_http_answers_total{status=\"4xx\"} 2\n",
+                             "terrane_queue_jobs 0\n",
+                             "terrane_oldest_in_flight_seconds 0\n",
+                             "terrane_credit_stalls_total 0\n",
+                             "# TYPE terrane_sent_bytes_total counter\n"}) {
         EXPECT_THAT(reply->body, HasSubstr(line));
     }
 }

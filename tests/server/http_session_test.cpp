@@ -117,6 +117,51 @@ struct Fixture {
 constexpr std::string_view kNow = "GET /now HTTP/1.1\r\nHost: a\r\n\r\n";
 constexpr std::string_view kChunk = "GET /chunk HTTP/1.1\r\nHost: a\r\n\r\n";
 
+TEST(HttpSession, WhoAsksTooOftenGets429UntilTimeHasPassed) {
+    Fixture f;
+    std::string asked;
+    f.context.rates_of = [&asked](std::string_view token) {
+        asked = token;
+        return HttpRates{.requests_per_second_max = token.empty() ? 2U : 0U,
+                         .bytes_per_second_max = 0};
+    };
+    f.send(std::string(kNow) + std::string(kNow) + std::string(kNow));
+    const std::string out = f.output();
+    EXPECT_THAT(out, HasSubstr("429 Too Many Requests"));
+    EXPECT_THAT(out, HasSubstr("Retry-After: 1\r\n"));
+    EXPECT_THAT(out, HasSubstr("2 requests a second are the most"));
+    EXPECT_LT(out.find("200 OK"), out.find("429"));
+    f.pass(600ms);
+    f.send(kNow);
+    EXPECT_THAT(f.output(), HasSubstr("200 OK"));
+    // A token that may do more.
+    for (int i = 0; i < 5; ++i) {
+        f.send("GET /now HTTP/1.1\r\nHost: a\r\nAuthorization: Bearer good\r\n\r\n");
+        EXPECT_THAT(f.output(), HasSubstr("200 OK"));
+    }
+    EXPECT_EQ(asked, "good");
+}
+
+TEST(HttpSession, WhoTakesTooManyBytesWaitsAndIsNotTimedOut) {
+    Fixture f;
+    f.context.rates_of = [](std::string_view) {
+        return HttpRates{.requests_per_second_max = 0, .bytes_per_second_max = 100};
+    };
+    f.context.timeouts.header = 500ms;
+    f.send(std::string(kNow) + std::string(kNow));
+    const std::string first = f.output();
+    EXPECT_EQ(first.find("200 OK"), first.rfind("200 OK")) << "one overdraws, the other waits";
+    ASSERT_TRUE(f.session->wake_at());
+    const auto wait = *f.session->wake_at() - f.now;
+    const double owed_bytes = static_cast<double>(first.size()) - 25;  // a quarter second is free
+    EXPECT_NEAR(std::chrono::duration<double>(wait).count(), owed_bytes / 100, 0.01);
+    f.pass(1000ms);
+    EXPECT_EQ(f.output(), "");
+    EXPECT_FALSE(f.session->is_closing());
+    f.pass(std::chrono::duration_cast<std::chrono::milliseconds>(wait) + 1ms);
+    EXPECT_THAT(f.output(), HasSubstr("200 OK"));
+}
+
 TEST(HttpSession, AnswersInTheStepThatReadTheRequestHoweverItIsCut) {
     Fixture f;
     for (std::size_t step = 1; step <= kNow.size(); ++step) {
@@ -155,7 +200,7 @@ TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
         }
         EXPECT_TRUE(f.session->is_dead());
         EXPECT_EQ(f.service->in_flight(), 0U);
-        EXPECT_EQ(count_of(f.counters.cancelled), 1U);
+        EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
         f.gate.passes.release();
     }
 }

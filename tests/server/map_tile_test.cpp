@@ -96,6 +96,25 @@ TEST(MapTile, EveryZoomCanBeDrawn) {
     }
 }
 
+TEST(MapTile, TheSamePixelsWhateverTheNumberOfThreads) {
+    const auto world = load_test_world("paper-B3-seed42");
+    StackGenerator generator(*world);
+    // Six blocks, those at the right and the bottom narrow.
+    const MapArea area{.first = {.x = -1000, .z = 70}, .width = 530, .height = 300, .lod = 5};
+    const auto alone = draw_map({.world = world.get(), .generator = &generator}, area);
+    ASSERT_TRUE(alone);
+    for (const std::int32_t threads : {1, 3, 16}) {
+        const auto image = draw_map(*world, area, threads);
+        ASSERT_TRUE(image);
+        EXPECT_EQ(image->pixels, alone->pixels) << threads;
+    }
+    const auto beyond = draw_map(
+        *world, {.first = {.x = kColumnCoordinateLimit - 9, .z = 0}, .width = 600, .height = 600},
+        3);
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().code, ErrorCode::out_of_range);
+}
+
 TEST(MapTile, AStoppedDrawingIsCancelled) {
     const auto world = load_test_world("paper-B3-seed42");
     StackGenerator generator(*world);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <optional>
 #include <span>
@@ -27,7 +28,13 @@ struct ReceivedMessage {
 
 class RawClient {
   public:
-    explicit RawClient(std::uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    /// `receive_buffer_bytes`: of the socket; 0: the system's choice.
+    explicit RawClient(std::uint16_t port, int receive_buffer_bytes = 0)
+        : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+        if (receive_buffer_bytes > 0) {
+            ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes,
+                         sizeof(receive_buffer_bytes));
+        }
         sockaddr_in address{};
         address.sin_family = AF_INET;
         address.sin_port = htons(port);
@@ -55,6 +62,25 @@ class RawClient {
     }
 
     bool send(const AnyMessage& message) { return send(encode_message(message)); }
+
+    /// As much as the socket takes at once; false when the server has closed.
+    bool send_some(std::span<const std::byte>& bytes) {
+        const ssize_t sent =
+            ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        bytes = bytes.subspan(sent > 0 ? static_cast<std::size_t>(sent) : 0);
+        return sent > 0 || errno == EAGAIN || errno == EWOULDBLOCK;
+    }
+
+    /// Takes what has come and throws it away; how much that was.
+    std::size_t drop_received() {
+        std::array<std::byte, 65536> buffer;
+        std::size_t dropped = 0;
+        for (ssize_t got = 0;
+             (got = ::recv(socket_, buffer.data(), buffer.size(), MSG_DONTWAIT)) > 0;
+             dropped += static_cast<std::size_t>(got)) {
+        }
+        return dropped;
+    }
 
     /// The next message; nothing when the server has closed, or is silent for ten seconds.
     std::optional<ReceivedMessage> next() {

@@ -1,15 +1,12 @@
 // terrane serve as a process of its own: what it prints, how it stops, its exit codes.
 #include "protocol/wire/messages.h"
-#include "server/cli/program.h"
 #include "server/net/tokens.h"
 #include "tests/server/raw_client.h"
+#include "tests/server/serve_process.h"
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
-#include <array>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -18,10 +15,6 @@
 
 namespace terrane {
 namespace {
-
-std::string world_path() {
-    return std::string(TERRANE_SOURCE_DIR) + "/generator/worlds/paper-B2.toml";
-}
 
 /// A folder that goes away with the test.
 struct Folder {
@@ -38,84 +31,6 @@ struct Folder {
 
     std::filesystem::path path;
 };
-
-int run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"terrane", "serve"});
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) {
-        argv.push_back(argument.data());
-    }
-    return run_program(static_cast<int>(argv.size()), argv.data());
-}
-
-/// `terrane serve` in a child, listening on a port of the system's choice.
-class ServeProcess {
-  public:
-    explicit ServeProcess(std::vector<std::string> arguments) {
-        std::array<int, 2> pipe{};
-        EXPECT_EQ(::pipe(pipe.data()), 0);
-        child_ = ::fork();
-        if (child_ == 0) {
-            ::dup2(pipe[1], STDOUT_FILENO);
-            ::close(pipe[0]);
-            ::close(pipe[1]);
-            arguments.insert(arguments.end(), {"--tcp", "127.0.0.1:0", "--http", "127.0.0.1:0"});
-            ::_exit(run(std::move(arguments)));
-        }
-        ::close(pipe[1]);
-        std::array<char, 256> buffer{};
-        while (line_.find('\n') == std::string::npos) {
-            const ssize_t got = ::read(pipe[0], buffer.data(), buffer.size());
-            if (got <= 0) {
-                break;
-            }
-            line_.append(buffer.data(), static_cast<std::size_t>(got));
-        }
-        ::close(pipe[0]);
-    }
-
-    ~ServeProcess() {
-        if (child_ > 0) {
-            signal(SIGKILL);
-            wait();
-        }
-    }
-
-    ServeProcess(const ServeProcess&) = delete;
-    ServeProcess& operator=(const ServeProcess&) = delete;
-
-    /// What it said when it was ready.
-    const std::string& line() const { return line_; }
-
-    std::uint16_t port() const {
-        const std::string before = "listening on tcp 127.0.0.1:";
-        EXPECT_TRUE(line_.starts_with(before)) << line_;
-        return static_cast<std::uint16_t>(std::atoi(line_.c_str() + before.size()));
-    }
-
-    void signal(int number) const { ::kill(child_, number); }
-
-    /// The wait status.
-    int wait() {
-        int status = 0;
-        ::waitpid(child_, &status, 0);
-        child_ = 0;
-        return status;
-    }
-
-  private:
-    pid_t child_ = 0;
-    std::string line_;
-};
-
-ChunkRequest row_of(std::uint32_t id) {
-    ChunkRequest request;
-    request.request_id = id;
-    for (std::int32_t x = 0; x < 64; ++x) {
-        request.keys.push_back({.lod = 0, .x = x, .y = 0, .z = static_cast<std::int32_t>(id)});
-    }
-    return request;
-}
 
 TEST(Serve, StopsUnderLoadWithAGoodbyeAndEveryAnswer) {
     for (int round = 0; round < 10; ++round) {
@@ -206,25 +121,28 @@ TEST(Serve, APortInUseOrAFolderItCanNotHaveIsAFailure) {
     const std::string data = (folder.path / "data").string();
     const ServeProcess serve({"--world", world_path(), "--data", data, "--log-level", "off"});
     const std::string port = std::to_string(serve.port());
-    EXPECT_EQ(run({"--world", world_path(), "--store", "memory", "--log-level", "off", "--tcp",
-                   "127.0.0.1:" + port}),
+    EXPECT_EQ(run_serve({"--world", world_path(), "--store", "memory", "--log-level", "off",
+                         "--tcp", "127.0.0.1:" + port}),
               kExitFailed);
-    EXPECT_EQ(run({"--world", world_path(), "--data", data, "--log-level", "off", "--tcp",
-                   "127.0.0.1:0"}),
+    EXPECT_EQ(run_serve({"--world", world_path(), "--data", data, "--log-level", "off", "--tcp",
+                         "127.0.0.1:0"}),
               kExitFailed)
         << "the folder is in use";
-    EXPECT_EQ(run({"--world", world_path(), "--data", "/proc/terrane", "--log-level", "off",
-                   "--tcp", "127.0.0.1:0"}),
+    EXPECT_EQ(run_serve({"--world", world_path(), "--data", "/proc/terrane", "--log-level", "off",
+                         "--tcp", "127.0.0.1:0"}),
               kExitFailed);
 }
 
 TEST(Serve, WrongUseIsExitCodeTwo) {
     const std::vector<std::string> good{"--world", world_path(), "--store", "memory"};
     const std::vector<std::vector<std::string>> wrong{
-        {"--tcp", "nowhere"},   {"--tcp", "127.0.0.1:65536"}, {"--workers", "0"},
-        {"--workers", "257"},   {"--cache-mib", "0"},         {"--cache-mib", "-1"},
-        {"--store", "paper"},   {"--log-format", "xml"},      {"--log-level", "loud"},
-        {"--no-such-flag"},     {"--world", "no-such.toml"},  {"extra"},
+        {"--tcp", "nowhere"},        {"--tcp", "127.0.0.1:65536"},
+        {"--workers", "0"},          {"--workers", "257"},
+        {"--cache-mib", "0"},        {"--cache-mib", "-1"},
+        {"--store", "paper"},        {"--log-format", "xml"},
+        {"--log-level", "loud"},     {"--tileset-levels", "4"},
+        {"--tileset-levels", "21"},  {"--no-such-flag"},
+        {"--world", "no-such.toml"}, {"extra"},
         {"--store", "rocksdb"},
     };
     for (const auto& flags : wrong) {
@@ -235,9 +153,9 @@ TEST(Serve, WrongUseIsExitCodeTwo) {
             arguments = {"--store", "memory"};
         }
         arguments.insert(arguments.end(), flags.begin(), flags.end());
-        EXPECT_EQ(run(arguments), kExitWrongUse) << flags[0];
+        EXPECT_EQ(run_serve(arguments), kExitWrongUse) << flags[0];
     }
-    EXPECT_EQ(run({}), kExitWrongUse);
+    EXPECT_EQ(run_serve({}), kExitWrongUse);
 }
 
 }  // namespace

@@ -123,7 +123,7 @@ TEST(Session, AnswersCancelledKeysAndStopsTheirWork) {
         EXPECT_EQ(failure_code(message), ErrorCode::cancelled);
         EXPECT_EQ(std::get<Failure>(message).request_id, 7U);
     }
-    EXPECT_EQ(count_of(f.counters.cancelled), 2U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 2U);
     f.gate.passes.release(2);
     f.mailbox.run(1);
     const auto rest = f.read();

@@ -176,7 +176,7 @@ TEST(SessionView, ATeleportStopsTheWorkOfTheOldPlace) {
     const std::size_t old_work = f.service->in_flight();
     EXPECT_GT(old_work, 40U);
     f.look(1e6, {1});
-    EXPECT_EQ(count_of(f.counters.cancelled), old_work);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), old_work);
     EXPECT_EQ(f.service->in_flight(), f.view_of(1e6, {1}).size());
     f.gate.passes.release(1);  // the one that had begun
     f.gate.passes.release(1000);

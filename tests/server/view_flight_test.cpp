@@ -181,7 +181,7 @@ TEST(ViewFlight, ATeleportEndsTheWorkOfTheOldPlaceWithinOneJobAWorker) {
     for (const auto& [at_place, count] : late) {
         EXPECT_LE(count, kWorkers) << at_place;
     }
-    EXPECT_GT(count_of(f.counters.cancelled), 0U);
+    EXPECT_GT(count_of(f.counters, &OutcomeCounters::cancelled), 0U);
 }
 
 }  // namespace

@@ -92,6 +92,15 @@ std::vector<JobId> popped_jobs(WorkQueue& queue, std::size_t count, std::uint64_
     return jobs;
 }
 
+TEST(WorkQueue, JobsThatCostNothingAreSharedToo) {
+    WorkQueue queue(8);
+    for (const JobId job : {1U, 2U, 3U}) {
+        ASSERT_TRUE(queue.push(job, {.flow = 1, .priority = 8}));
+        ASSERT_TRUE(queue.push(10 + job, {.flow = 2, .priority = -8}));
+    }
+    EXPECT_EQ(popped_jobs(queue, 6, 0), (std::vector<JobId>{1, 11, 2, 12, 3, 13}));
+}
+
 TEST(WorkQueue, AHugeQueueDoesNotStarveASmallOne) {
     WorkQueue queue(2000);
     for (JobId job = 1; job <= 1000; ++job) {

@@ -53,6 +53,7 @@ class LoadRun {
     struct Viewer {
         StreamLoop::StreamId stream = 0;
         std::unique_ptr<LoadClient> client;
+        Clock::time_point begun;
         Clock::time_point next_tick;
         bool is_open = false;  ///< connected, and not over
         bool is_over = false;
@@ -157,6 +158,7 @@ void LoadRun::start_clients(Clock::time_point now) {
         Viewer viewer;
         viewer.client =
             std::make_unique<LoadClient>(client, movement, std::move(carrier), handlers_);
+        viewer.begun = now;
         viewer.next_tick = now + kLoadStep;
         viewers_.push_back(std::move(viewer));
         viewers_.back().stream = loop_->connect();  // its id is its place in viewers_
@@ -181,6 +183,8 @@ void LoadRun::tick_clients(Clock::time_point now) {
             flush(viewer);
             viewer.is_hung = viewer.is_hung ||
                              (viewer.client->is_hung(now) && !loop_->has_unread(viewer.stream));
+        } else if (now - viewer.begun > options_.client.patience) {
+            viewer.is_hung = true;  // it could not even connect
         }
     }
 }
@@ -238,8 +242,9 @@ Result<LoadResult> LoadRun::run() {
     handlers.closed = [this](StreamLoop::StreamId id, const Error& error) {
         end(viewers_[id], error);
     };
-    auto loop = StreamLoop::open(options_.host, options_.port, std::move(handlers),
-                                 begin_ + options_.client.patience);
+    auto loop =
+        StreamLoop::open({.host = options_.host, .port = options_.port, .tls = options_.tls},
+                         std::move(handlers), begin_ + options_.client.patience);
     if (!loop) {
         return tl::unexpected(loop.error());
     }

@@ -1,6 +1,7 @@
 // terrane-client load: many viewers at once, to learn what a server bears before players do.
 #pragma once
 
+#include "client-sample/cpp/connection.h"
 #include "client-sample/cpp/program/carrier.h"
 #include "client-sample/cpp/program/load_client.h"
 #include "client-sample/cpp/program/load_report.h"
@@ -22,6 +23,7 @@ inline constexpr std::size_t kLoadClientsMax = 16'384;  ///< as many as a server
 struct LoadOptions {
     std::string host = "127.0.0.1";
     std::uint16_t port = 7777;
+    TlsUse tls;
     CarrierKind carrier = CarrierKind::tcp;
     std::size_t clients = 50;
     double seconds = 10;
@@ -39,7 +41,7 @@ struct LoadOptions {
 };
 
 /// Runs the load and gives what it found; `progress` gets a line a second. Fails with `io_error` if
-/// the server's name can't be resolved.
+/// the server's name can't be resolved, or the certificates to trust can't be read.
 Result<LoadResult> run_load(const LoadOptions& options,
                             const std::function<void(const std::string&)>& progress);
 

@@ -1,4 +1,5 @@
 // The command line of `terrane-client load`.
+#include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get.h"
 #include "client-sample/cpp/program/load.h"
 #include "client-sample/cpp/program/program.h"
@@ -197,7 +198,7 @@ void add_load_command(CLI::App& app, int& exit_code) {
                    "Over HTTP/1.1, a kept connection each: a GET a chunk, by key")
         ->excludes(ws);
     add_what_clients_do(*load, *flags);
-    load->add_option("--token", flags->options.client.token, "For a server that asks for one");
+    add_door_flags(*load, flags->options.client.token, flags->options.tls);
     load->add_option("--check", flags->options.check_every,
                      "Compare every N-th chunk with one generated here from the server's world "
                      "file; 0: none")
@@ -225,6 +226,7 @@ void add_load_command(CLI::App& app, int& exit_code) {
         "Examples:\n"
         "  terrane-client load --clients 200 --seconds 30             200 walkers\n"
         "  terrane-client load --clients 50 --move mix --json         for programs\n"
+        "  terrane-client load --ws --tls --ca ca.pem --server HOST:8080 --token T\n"
         "  terrane-client load --path tour.txt --radius 8,8,8,8,8     far views along a tour");
     load->callback([flags, &exit_code] { exit_code = run_load_command(*flags); });
 }

@@ -1,13 +1,18 @@
 #include "client-sample/cpp/program/stream_loop.h"
 
+#include "client-sample/cpp/tls_peer.h"
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
 #include <boost/asio/write.hpp>
+#include <openssl/ssl.h>
 
 #include <array>
 #include <deque>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -27,6 +32,8 @@ struct Stream {
     explicit Stream(asio::io_context& context) : socket(context) {}
 
     tcp::socket socket;
+    std::optional<asio::ssl::stream<tcp::socket&>> tls;
+    Bytes decrypted;  ///< where TLS reads to, which must stay while it waits
     bool is_open = false;
     bool is_ended = false;
     bool is_writing = false;
@@ -39,7 +46,9 @@ struct Stream {
 struct StreamLoop::State {
     asio::io_context context{1};
     std::vector<tcp::endpoint> endpoints;
+    std::string host;
     std::string peer;
+    std::optional<asio::ssl::context> tls_context;
     Handlers handlers;
     std::vector<std::shared_ptr<Stream>> streams;
     /// One for all: bytes are handed on before the next read.
@@ -61,7 +70,53 @@ struct StreamLoop::State {
         stream.socket.close(ignored);
     }
 
+    void shake_hands(StreamId id) {
+        const auto& stream = streams[id];
+        stream->tls.emplace(stream->socket, *tls_context);
+        if (const auto named = demand_host(stream->tls->native_handle(), host); !named) {
+            end(id, named.error().message);
+            return;
+        }
+        stream->decrypted.resize(kReceiveBytes);
+        stream->tls->async_handshake(asio::ssl::stream_base::client,
+                                     [this, id, stream](error_code error) {
+                                         if (error && !stream->is_ended) {
+                                             end(id, "TLS: " + error.message());
+                                         } else if (!stream->is_ended) {
+                                             begin(id);
+                                         }
+                                     });
+    }
+
+    void begin(StreamId id) {
+        const auto stream = streams[id];
+        stream->is_open = true;
+        handlers.opened(id);
+        if (!stream->is_ended) {
+            read(id);
+            write(id);
+        }
+    }
+
+    void take(StreamId id, error_code error, std::span<const std::byte> bytes) {
+        const auto stream = streams[id];
+        if (error) {
+            const bool is_over =
+                error == asio::error::eof || error == asio::ssl::error::stream_truncated;
+            end(id, is_over ? "the server closed the connection" : error.message());
+            return;
+        }
+        handlers.received(id, bytes);
+        if (!stream->is_ended) {
+            read(id);
+        }
+    }
+
     void read(StreamId id) {
+        if (streams[id]->tls) {
+            read_tls(id);
+            return;
+        }
         // Waiting takes no buffer, so thousands of idle connections hold none.
         streams[id]->socket.async_wait(
             tcp::socket::wait_read, [this, id, stream = streams[id]](error_code error) {
@@ -76,16 +131,19 @@ struct StreamLoop::State {
                     read(id);
                     return;
                 }
-                if (error) {
-                    end(id, error == asio::error::eof ? "the server closed the connection"
-                                                      : error.message());
-                    return;
-                }
-                handlers.received(id, std::span<const std::byte>(received).first(size_bytes));
-                if (!stream->is_ended) {
-                    read(id);
-                }
+                take(id, error, std::span<const std::byte>(received).first(size_bytes));
             });
+    }
+
+    void read_tls(StreamId id) {
+        const auto& stream = streams[id];
+        stream->tls->async_read_some(asio::buffer(stream->decrypted), [this, id, stream](
+                                                                          error_code error,
+                                                                          std::size_t size_bytes) {
+            if (!stream->is_ended) {
+                take(id, error, std::span<const std::byte>(stream->decrypted).first(size_bytes));
+            }
+        });
     }
 
     void write(StreamId id) {
@@ -94,21 +152,25 @@ struct StreamLoop::State {
             return;
         }
         stream->is_writing = true;
-        const Bytes& front = stream->queue.front();
-        asio::async_write(stream->socket, asio::buffer(front.data(), front.size()),
-                          [this, id, stream](error_code error, std::size_t) {
-                              stream->is_writing = false;
-                              stream->queued_bytes -= stream->queue.front().size();
-                              stream->queue.pop_front();
-                              if (stream->is_ended) {
-                                  return;
-                              }
-                              if (error) {
-                                  end(id, error.message());
-                                  return;
-                              }
-                              write(id);
-                          });
+        const asio::const_buffer front = asio::buffer(stream->queue.front());
+        const auto written = [this, id, stream](error_code error, std::size_t) {
+            stream->is_writing = false;
+            stream->queued_bytes -= stream->queue.front().size();
+            stream->queue.pop_front();
+            if (stream->is_ended) {
+                return;
+            }
+            if (error) {
+                end(id, error.message());
+                return;
+            }
+            write(id);
+        };
+        if (stream->tls) {
+            asio::async_write(*stream->tls, front, written);
+        } else {
+            asio::async_write(stream->socket, front, written);
+        }
     }
 };
 
@@ -118,21 +180,30 @@ StreamLoop::StreamLoop(StreamLoop&&) noexcept = default;
 StreamLoop& StreamLoop::operator=(StreamLoop&&) noexcept = default;
 StreamLoop::~StreamLoop() = default;
 
-Result<StreamLoop> StreamLoop::open(const std::string& host, std::uint16_t port, Handlers handlers,
-                                    Deadline deadline) {
+Result<StreamLoop> StreamLoop::open(const Target& target, Handlers handlers, Deadline deadline) {
     auto state = std::make_unique<State>();
-    state->peer = host + ":" + std::to_string(port);
+    state->host = target.host;
+    state->peer = target.host + ":" + std::to_string(target.port);
     state->handlers = std::move(handlers);
+    if (target.tls.enabled) {
+        state->tls_context.emplace(asio::ssl::context::tls_client);
+        if (const auto trusted =
+                demand_trust(state->tls_context->native_handle(), target.tls.ca_file);
+            !trusted) {
+            return tl::unexpected(trusted.error());
+        }
+    }
     tcp::resolver resolver(state->context);
     error_code outcome;
     bool is_resolved = false;
-    resolver.async_resolve(host, std::to_string(port), [&](error_code error, const auto& results) {
-        outcome = error;
-        is_resolved = true;
-        for (const auto& result : results) {
-            state->endpoints.push_back(result.endpoint());
-        }
-    });
+    resolver.async_resolve(target.host, std::to_string(target.port),
+                           [&](error_code error, const auto& results) {
+                               outcome = error;
+                               is_resolved = true;
+                               for (const auto& result : results) {
+                                   state->endpoints.push_back(result.endpoint());
+                               }
+                           });
     state->context.run_until(deadline);
     if (!is_resolved || outcome) {
         resolver.cancel();
@@ -161,11 +232,10 @@ StreamLoop::StreamId StreamLoop::connect() {
                                 state.end(id, error.message());
                                 return;
                             }
-                            stream->is_open = true;
-                            state.handlers.opened(id);
-                            if (!stream->is_ended) {
-                                state.read(id);
-                                state.write(id);
+                            if (state.tls_context) {
+                                state.shake_hands(id);
+                            } else {
+                                state.begin(id);
                             }
                         });
     return id;
@@ -186,9 +256,10 @@ void StreamLoop::send(StreamId id, Bytes bytes) {
 }
 
 bool StreamLoop::has_unread(StreamId id) const {
-    const Stream& stream = *state_->streams[id];
+    Stream& stream = *state_->streams[id];
     error_code error;
-    return stream.is_open && stream.socket.available(error) > 0 && !error;
+    const bool has_decrypted = stream.tls && SSL_has_pending(stream.tls->native_handle()) == 1;
+    return stream.is_open && (has_decrypted || stream.socket.available(error) > 0) && !error;
 }
 
 void StreamLoop::close(StreamId id) {
@@ -198,7 +269,11 @@ void StreamLoop::close(StreamId id) {
         if (stream.is_open && !stream.is_writing) {
             error_code ignored;
             for (const Bytes& bytes : stream.queue) {
-                stream.socket.write_some(asio::buffer(bytes.data(), bytes.size()), ignored);
+                if (stream.tls) {
+                    stream.tls->write_some(asio::buffer(bytes), ignored);
+                } else {
+                    stream.socket.write_some(asio::buffer(bytes), ignored);
+                }
             }
         }
         State::shut(stream);

@@ -1,11 +1,11 @@
-// Many TCP connections on one thread: bytes out, bytes in. The only file of the program that knows
-// Asio; what the bytes mean is the carrier's (carrier.h).
+// Many TCP connections on one thread, with TLS in them if wanted: bytes out, bytes in. The only
+// file of the program that knows Asio; what the bytes mean is the carrier's (carrier.h).
 #pragma once
 
+#include "client-sample/cpp/connection.h"
 #include "protocol/base/bytes.h"
 #include "protocol/base/result.h"
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -22,18 +22,23 @@ inline constexpr std::size_t kSendQueueBytesMax = std::size_t{4} << 20U;
 class StreamLoop {
   public:
     using StreamId = std::size_t;
-    using Deadline = std::chrono::steady_clock::time_point;
 
     struct Handlers {
+        /// Connected, and after the handshake if it is TLS.
         std::function<void(StreamId)> opened;
         std::function<void(StreamId, std::span<const std::byte>)> received;
         /// Once, unless `close` was called: it could not connect, or the peer has gone.
         std::function<void(StreamId, const Error&)> closed;
     };
 
-    /// Resolves the name. Fails with `io_error`.
-    static Result<StreamLoop> open(const std::string& host, std::uint16_t port, Handlers handlers,
-                                   Deadline deadline);
+    struct Target {
+        std::string host;
+        std::uint16_t port = 0;
+        TlsUse tls;  ///< the certificate must be good for `host`
+    };
+
+    /// Resolves the name. Fails with `io_error`, for certificates that can't be read too.
+    static Result<StreamLoop> open(const Target& target, Handlers handlers, Deadline deadline);
 
     StreamLoop(StreamLoop&&) noexcept;
     StreamLoop& operator=(StreamLoop&&) noexcept;

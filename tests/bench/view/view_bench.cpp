@@ -390,7 +390,8 @@ void measure_teleport(const Options& options, Report& report,
     }
     report.figure("teleport: places", static_cast<double>(first_seen.size()), "");
     report.figure("teleport: pieces of work", static_cast<double>(builds.size()), "");
-    report.figure("teleport: cancelled", static_cast<double>(count_of(server.counters().cancelled)),
+    report.figure("teleport: cancelled",
+                  static_cast<double>(count_of(server.counters(), &OutcomeCounters::cancelled)),
                   "");
     report.figure("teleport: near ring, wanted to there, p99", percentile(figures.near_ms, 0.99),
                   "ms");
