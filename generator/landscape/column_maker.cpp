@@ -45,12 +45,12 @@ struct ColumnMaker::Place {
     }
 };
 
-void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                             std::int32_t block_top) const {
+void ColumnMaker::add_layers(const Place& place, std::int32_t moved256,
+                             std::int32_t block_top) {
     const std::size_t plane = sources_.region.plane_size();
     const std::int32_t* y256 = sources_.region.y256.data() + place.at;
     const std::size_t layers = sources_.rules.size();
-    std::int32_t bottom = out.top();
+    std::int32_t bottom = runs_.top();
     const std::int32_t block_bottom = bottom;
     LimitTail below = 0;
     bool below_alone = true;
@@ -65,7 +65,7 @@ void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t m
         const std::int32_t blend =
             blends ? std::max(1, ((top - bottom) * rule.blend + 128) >> 8) : 0;
         const std::int32_t end = std::min(top, block_top);
-        out.push({.bottom = bottom,
+        runs_.push({.bottom = bottom,
                   .top = end,
                   .middle = std::min(bottom + blend, end),
                   .tail = tail,
@@ -77,7 +77,7 @@ void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t m
     if (bottom < block_top) {  // the stack ends below the ground
         const std::uint16_t soil = sources_.constants.palette.soil;
         const auto last = static_cast<std::uint16_t>(layers - 1);
-        out.push({.bottom = bottom,
+        runs_.push({.bottom = bottom,
                   .top = block_top,
                   .middle = bottom,
                   .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
@@ -86,8 +86,8 @@ void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t m
     }
 }
 
-void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                             std::int32_t block_bottom) const {
+void ColumnMaker::add_lenses(const Place& place, std::int32_t moved256,
+                             std::int32_t block_bottom) {
     const Region& region = sources_.region;
     std::uint64_t gaps = region.gap_mask[place.at];
     for (std::size_t gap = 0; gaps != 0; ++gap, gaps >>= 1U) {
@@ -108,7 +108,7 @@ void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t m
                 region.thickness[element.raster + static_cast<std::size_t>(z * element.stride + x)];
             if (thickness > 0) {
                 const bool is_cave = element.element().type == ElementType::cave;
-                out.replace(
+                runs_.replace(
                     std::max(base, block_bottom), base + to_256(thickness),
                     tail_of(static_cast<std::uint16_t>(sources_.world.base_palette.size() + e),
                             is_cave ? 0 : place.flow_of(gap)));
@@ -117,7 +117,7 @@ void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t m
     }
 }
 
-void ColumnMaker::add_blocks(ColumnRuns& out, const Place& place) const {
+void ColumnMaker::add_blocks(const Place& place) {
     const auto planes = sources_.fractures.planes(place.field_at);
     const float fold = sources_.folds[place.field_at];
     std::array<float, kPlanesPerColumnMax + 1> tops{};
@@ -139,18 +139,18 @@ void ColumnMaker::add_blocks(ColumnRuns& out, const Place& place) const {
         for (const PlaneInColumn& plane : planes) {
             moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
         }
-        const std::int32_t block_bottom = out.top();
+        const std::int32_t block_bottom = runs_.top();
         const std::int32_t block_top =
             b + 1 == blocks ? place.top256 : std::min(to_256(tops[b]), place.top256);
         if (block_top > block_bottom) {
-            add_layers(out, place, to_256(moved), block_top);
-            add_lenses(out, place, to_256(moved), block_bottom);
+            add_layers(place, to_256(moved), block_top);
+            add_lenses(place, to_256(moved), block_bottom);
         }
         bottom = tops[b];
     }
 }
 
-void ColumnMaker::add_sheets(ColumnRuns& out, const Place& place) const {
+void ColumnMaker::add_sheets(const Place& place) {
     const auto& fillings = sources_.constants.palette.fillings;
     if (fillings.empty()) {
         return;
@@ -167,12 +167,20 @@ void ColumnMaker::add_sheets(ColumnRuns& out, const Place& place) const {
         const auto& filling = fillings[plane.filling % fillings.size()];
         const std::int32_t flow = place.flow_of(0);
         const std::int32_t rich_from = to_256(place.ground - kEnrichedDepth);
-        out.replace(low, std::min(high, rich_from), tail_of(filling.primary, flow));
-        out.replace(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
+        runs_.replace(low, std::min(high, rich_from), tail_of(filling.primary, flow));
+        runs_.replace(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
     }
 }
 
-void ColumnMaker::add_cover(ColumnRuns& out, const Place& place) const {
+/// What lies on the ground: where it begins, in 1/256 voxel, and its palette id.
+struct ColumnMaker::Cover {
+    std::int32_t soil_from = 0;  ///< or sand
+    std::int32_t snow_from = 0;
+    std::uint16_t soil = LandscapePalette::kNoEntry;  ///< kNoEntry: there is none
+    std::uint16_t snow = LandscapePalette::kNoEntry;
+};
+
+ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
     const LandscapeConstants& constants = sources_.constants;
     const auto stride = static_cast<std::size_t>(sources_.region.shape.stride());
     const float per_column = 0.5F / static_cast<float>(sources_.region.shape.step);
@@ -181,11 +189,11 @@ void ColumnMaker::add_cover(ColumnRuns& out, const Place& place) const {
     const float slope_z = (ground[stride] - *(ground - stride)) * per_column;
     const float square = slope_x * slope_x + slope_z * slope_z;
     const float noise = sources_.soil[place.at];
-    const LimitTail below = out.last().tail;
-    const auto lay = [&](std::uint16_t id, float thickness) {
+    Cover cover;
+    const auto lay = [&](std::uint16_t& as, std::int32_t& from, std::uint16_t id, float thickness) {
         if (id != LandscapePalette::kNoEntry && thickness >= kLeastCover) {
-            const LimitTail tail = (below & ~LimitTail{0xffff}) | id;
-            out.replace(place.top256 - to_256(thickness), place.top256, tail);
+            as = id;
+            from = std::max(0, place.top256 - to_256(thickness));
         }
     };
     const float soil = constants.soil * (1.0F - square / kSteepestSoil) *
@@ -194,18 +202,31 @@ void ColumnMaker::add_cover(ColumnRuns& out, const Place& place) const {
     const bool by_river = sources_.channels.nearness[place.at] < kSandWidths;
     const bool by_sea = place.ground < constants.sea + kBeach;
     if ((by_river || by_sea) && square < kSteepestSnow) {
-        lay(constants.palette.sand, std::max(1.2F, soil));
+        lay(cover.soil, cover.soil_from, constants.palette.sand, std::max(1.2F, soil));
     } else {
-        lay(constants.palette.soil, soil);
+        lay(cover.soil, cover.soil_from, constants.palette.soil, soil);
     }
     if (constants.has_snow && place.water == kNoWater) {
         const float above =
             (place.ground - constants.snow_line + kSnowLineNoise * noise) * (1.0F / 12.0F);
-        lay(constants.palette.snow, kSnow * clamp01(above) * (1.0F - square / kSteepestSnow));
+        lay(cover.snow, cover.snow_from, constants.palette.snow,
+            kSnow * clamp01(above) * (1.0F - square / kSteepestSnow));
+    }
+    return cover;
+}
+
+void ColumnMaker::add_cover(const Place& place) {
+    const Cover cover = cover_of(place);
+    const LimitTail flow = runs_.last().tail & ~LimitTail{0xffff};
+    if (cover.soil != LandscapePalette::kNoEntry) {
+        runs_.replace(cover.soil_from, place.top256, flow | cover.soil);
+    }
+    if (cover.snow != LandscapePalette::kNoEntry) {
+        runs_.replace(cover.snow_from, place.top256, flow | cover.snow);
     }
 }
 
-void ColumnMaker::add_caves(ColumnRuns& out, const Place& place) const {
+void ColumnMaker::add_caves(const Place& place) {
     const auto found = sources_.caves.gaps(place.at);
     if (found.empty()) {
         return;
@@ -241,72 +262,209 @@ void ColumnMaker::add_caves(ColumnRuns& out, const Place& place) const {
         }
         const std::int32_t floor = to_256(gap.floor);
         const std::int32_t lid = gap.lid >= place.ground ? place.top256 : to_256(gap.lid);
-        out.replace(floor, lid, tail_of(constants.palette.cave_air, 0));
+        runs_.replace(floor, lid, tail_of(constants.palette.cave_air, 0));
         if (constants.palette.water != LandscapePalette::kNoEntry && flooded > gap.floor) {
-            out.replace(floor, std::min(lid, to_256(flooded)), tail_of(constants.palette.water, 0));
+            runs_.replace(floor, std::min(lid, to_256(flooded)), tail_of(constants.palette.water, 0));
         }
     }
     // What is open to the sky is no cave.
-    if (palette_id_of(out.last().tail) == constants.palette.cave_air) {
-        out.cut(out.last().bottom);
+    if (palette_id_of(runs_.last().tail) == constants.palette.cave_air) {
+        runs_.cut(runs_.last().bottom);
     }
 }
 
-void ColumnMaker::add_overhang(ColumnRuns& out, const Place& place) const {
+void ColumnMaker::add_overhang(const Place& place) {
     const Overhang* const overhang = sources_.overhangs.at(place.at);
     if (overhang == nullptr || place.water > kNoWater) {
         return;
     }
     const auto layer = static_cast<std::uint16_t>(overhang->layer);
     const LimitTail rock = tail_of(layer, place.flow_of(static_cast<std::size_t>(overhang->layer)));
-    const std::int32_t ground = out.top();
+    const std::int32_t ground = runs_.top();
     const std::int32_t top = to_256(overhang->top);
     const bool is_filled = overhang->bottom <= place.ground;
     const std::int32_t bottom = is_filled ? ground : to_256(overhang->bottom);
     if (top <= ground || bottom < ground) {
         return;
     }
-    out.push({.bottom = ground,
+    runs_.push({.bottom = ground,
               .top = bottom,
               .middle = ground,
               .tail = tail_of(sources_.constants.palette.open_air, 0),
               .from = 0});
-    out.push({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+    runs_.push({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
 }
 
-void ColumnMaker::make(ColumnRuns& out, std::int32_t x, std::int32_t z, bool has_flow) const {
+ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool has_flow) const {
     const Region& region = sources_.region;
     Place place;
-    place.column = x + 2;  // the shape has an apron of two columns
-    place.row = z + 2;
+    place.column = x + region.apron;
+    place.row = z + region.apron;
     place.at = static_cast<std::size_t>(place.row * region.shape.stride() + place.column);
-    place.field_at = static_cast<std::size_t>(
-        (place.row + sources_.margin) * sources_.field.stride() + place.column + sources_.margin);
+    place.field_at = sources_.field_first + static_cast<std::size_t>(
+                                                place.row * sources_.field.stride() + place.column);
     place.ground = sources_.banks[place.at];
     place.water = sources_.channels.water[place.at];
     place.top256 = std::max(to_256(place.ground), 2 * kUnitsPerVoxel);
     if (has_flow) {
-        place.flow =
-            region.flow.data() + static_cast<std::ptrdiff_t>(z + 1) * region.flow_stride + (x + 1);
+        place.flow = region.flow.data() + static_cast<std::ptrdiff_t>(z) * region.flow_stride + x;
         place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
     }
-    out.clear();
-    add_blocks(out, place);
-    add_sheets(out, place);
+    return place;
+}
+
+void ColumnMaker::make(const Place& place) {
+    runs_.clear();
+    add_blocks(place);
+    add_sheets(place);
     if (sources_.constants.has_relief) {
-        add_cover(out, place);
+        add_cover(place);
     }
-    add_caves(out, place);
+    add_caves(place);
     const std::uint16_t water = sources_.constants.palette.water;
     if (place.water > kNoWater && water != LandscapePalette::kNoEntry) {
-        const std::int32_t bed = out.top();
-        out.push({.bottom = bed,
-                  .top = to_256(place.water),
-                  .middle = bed,
-                  .tail = tail_of(water, 0),
-                  .from = 0});
+        const std::int32_t bed = runs_.top();
+        runs_.push({.bottom = bed,
+                    .top = to_256(place.water),
+                    .middle = bed,
+                    .tail = tail_of(water, 0),
+                    .from = 0});
     }
-    add_overhang(out, place);
+    add_overhang(place);
+}
+
+/// Whether nothing but layers, cover and open water is there, and no fracture parts it.
+bool ColumnMaker::is_plain(const Place& place) const {
+    if (!sources_.constants.has_relief || sources_.region.gap_mask[place.at] != 0 ||
+        !sources_.caves.gaps(place.at).empty() || sources_.overhangs.at(place.at) != nullptr) {
+        return false;
+    }
+    const bool has_sheets = !sources_.constants.palette.fillings.empty();
+    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
+        const float half_sheet = has_sheets ? plane.half_sheet + 1.0F : 0.0F;
+        if (plane.y > -half_sheet && plane.y < std::max(place.ground, 2.0F) + half_sheet) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// The limits of a plain column, as `make` and ColumnRuns::write would find them; nothing if the
+/// stack ends below the ground.
+Limit* ColumnMaker::write_plain(Limit* out, const Place& place) const {
+    const Cover cover = cover_of(place);
+    const bool has_soil = cover.soil != LandscapePalette::kNoEntry;
+    const bool has_snow = cover.snow != LandscapePalette::kNoEntry;
+    std::int32_t rock_top = place.top256;
+    rock_top = has_soil ? std::min(rock_top, cover.soil_from) : rock_top;
+    rock_top = has_snow ? std::min(rock_top, cover.snow_from) : rock_top;
+    float moved = sources_.folds[place.field_at];
+    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
+        moved += plane.y <= 0 ? -plane.half_throw : plane.half_throw;
+    }
+    const std::int32_t moved256 = to_256(moved);
+    const auto plane = static_cast<std::ptrdiff_t>(sources_.region.plane_size());
+    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
+    const std::int32_t* flow = place.flow;
+    const auto layers = static_cast<std::int32_t>(sources_.region.layers_built);
+    std::int32_t k = 0;
+    while (k < layers && y256[k * plane] + moved256 <= 0) {
+        ++k;
+    }
+    std::int32_t bottom = 0;
+    bool below_alone = true;
+    std::int32_t highest = k;  // the layer at the ground
+    for (; k < layers && bottom < rock_top; ++k) {
+        const std::int32_t top = y256[k * plane] + moved256;
+        if (top <= bottom) {
+            continue;
+        }
+        const LayerRules& rule = sources_.rules[static_cast<std::size_t>(k)];
+        const LimitTail tail =
+            tail_of(static_cast<std::uint16_t>(k), flow == nullptr ? 0 : flow[k * place.flow_plane]);
+        const std::int32_t end = std::min(top, rock_top);
+        if (below_alone || rule.alone || rule.blend <= 0) {
+            put_limit(out++, bottom, tail);
+        } else {
+            const std::int32_t blend = std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
+            if (bottom + blend < end) {
+                put_limit(out++, bottom + blend, tail);
+            }
+        }
+        put_limit(out++, end, tail);
+        bottom = end;
+        below_alone = rule.alone;
+        highest = k;
+    }
+    if (bottom < rock_top) {
+        return nullptr;
+    }
+    // What is below the cover may be higher layers that it hides.
+    for (std::int32_t top = k > 0 ? y256[(k - 1) * plane] + moved256 : 0; top < place.top256; ++k) {
+        if (k == layers) {
+            return nullptr;
+        }
+        if (const std::int32_t next = y256[k * plane] + moved256; next > top) {
+            top = next;
+            highest = k;
+        }
+    }
+    const LimitTail cover_flow =
+        flow == nullptr ? 0 : tail_of(0, flow[highest * place.flow_plane]);
+    const auto lay = [&](std::int32_t from, std::int32_t to, LimitTail tail) {
+        if (to > from) {
+            put_limit(out++, from, tail);
+            put_limit(out++, to, tail);
+        }
+    };
+    if (has_soil) {
+        lay(cover.soil_from, has_snow ? cover.snow_from : place.top256, cover_flow | cover.soil);
+    }
+    if (has_snow) {
+        lay(cover.snow_from, place.top256, cover_flow | cover.snow);
+    }
+    std::int32_t top = place.top256;
+    if (place.water > kNoWater && sources_.constants.palette.water != LandscapePalette::kNoEntry) {
+        const std::int32_t level = to_256(place.water);
+        lay(top, level, sources_.constants.palette.water);
+        top = std::max(top, level);
+    }
+    put_limit(out++, top, sources_.world.void_id());
+    return out;
+}
+
+void ColumnMaker::mark_elements(std::span<const Limit> limits) {
+    for (const Limit& limit : limits) {
+        const std::size_t id = limit.palette_id;
+        if (id >= sources_.world.base_palette.size()) {
+            element_ids_[id - sources_.world.base_palette.size()] = 0;
+        }
+    }
+}
+
+std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
+                               bool has_flow) {
+    const auto grow = [&limits](std::size_t most) {
+        if (limits.size() < most) {
+            limits.resize(std::max(most, 2 * limits.size()));
+        }
+    };
+    const Place place = place_at(x, z, has_flow);
+    if (is_plain(place)) {
+        grow(used + 2 * sources_.rules.size() + 8);
+        if (const Limit* const end = write_plain(limits.data() + used, place); end != nullptr) {
+            return static_cast<std::size_t>(end - limits.data());
+        }
+    }
+    make(place);
+    grow(used + runs_.limits_max());
+    const Limit* const end = runs_.write(limits.data() + used, sources_.world.void_id());
+    const auto now = static_cast<std::size_t>(end - limits.data());
+    // Only columns that lenses meet can show one.
+    if (sources_.region.gap_mask[place.at] != 0) {
+        mark_elements(std::span(limits).subspan(used, now - used));
+    }
+    return now;
 }
 
 }  // namespace terrane

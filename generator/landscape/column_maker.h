@@ -2,9 +2,11 @@
 //
 // Blocks between fracture planes, each with its layers and lenses; the fillings of fractures; soil,
 // sand and snow; caves and what floods them; open water; an overhang. What comes later replaces
-// what was there, see column_runs.h.
+// what was there, see column_runs.h. Most columns have but layers in one block, a cover and perhaps
+// open water: their limits are written as they are found, and are the same.
 #pragma once
 
+#include "generator/landscape/column_runs.h"
 #include "generator/landscape/landscape.h"
 
 #include <cstdint>
@@ -30,31 +32,41 @@ struct ColumnSources {
     const FractureField& fractures;   ///< of the field
     const std::vector<float>& folds;  ///< likewise
     const RectangleShape& field;
-    std::int32_t margin = 0;  ///< columns from the field's side to the shape's
+    std::size_t field_first = 0;  ///< where the shape's first column lies in the field's rasters
 };
 
 class ColumnMaker {
   public:
-    explicit ColumnMaker(const ColumnSources& sources) : sources_(sources) {}
+    /// `element_ids`: those that show in some column become 0.
+    ColumnMaker(const ColumnSources& sources, std::span<std::uint16_t> element_ids)
+        : sources_(sources), element_ids_(element_ids) {}
 
-    /// Overwrites `out` with column (x, z), counted from the rectangle's corner, -1 being its
-    /// apron.
-    void make(ColumnRuns& out, std::int32_t x, std::int32_t z, bool has_flow) const;
+    /// Writes column (x, z), counted from the rectangle's corner, -1 being its apron, behind the
+    /// first `used` limits; returns how many there are then. What is behind them is no column's.
+    std::size_t write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
+                      bool has_flow);
 
   private:
     struct Place;
+    struct Cover;
 
-    void add_blocks(ColumnRuns& out, const Place& place) const;
-    void add_layers(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                    std::int32_t block_top) const;
-    void add_lenses(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                    std::int32_t block_bottom) const;
-    void add_sheets(ColumnRuns& out, const Place& place) const;
-    void add_cover(ColumnRuns& out, const Place& place) const;
-    void add_caves(ColumnRuns& out, const Place& place) const;
-    void add_overhang(ColumnRuns& out, const Place& place) const;
+    Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
+    bool is_plain(const Place& place) const;
+    Limit* write_plain(Limit* out, const Place& place) const;
+    void make(const Place& place);
+    void mark_elements(std::span<const Limit> limits);
+    void add_blocks(const Place& place);
+    void add_layers(const Place& place, std::int32_t moved256, std::int32_t block_top);
+    void add_lenses(const Place& place, std::int32_t moved256, std::int32_t block_bottom);
+    void add_sheets(const Place& place);
+    Cover cover_of(const Place& place) const;
+    void add_cover(const Place& place);
+    void add_caves(const Place& place);
+    void add_overhang(const Place& place);
 
     ColumnSources sources_;
+    std::span<std::uint16_t> element_ids_;
+    ColumnRuns runs_;
 };
 
 }  // namespace terrane

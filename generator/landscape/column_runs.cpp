@@ -2,22 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
 namespace terrane {
-namespace {
-
-Limit limit_of(std::int32_t y256, LimitTail tail) {
-    const auto flow = [tail](unsigned shift) {
-        return static_cast<std::int8_t>(static_cast<std::uint8_t>(tail >> shift));
-    };
-    return {.y256 = y256,
-            .palette_id = palette_id_of(tail),
-            .flow = {.x = flow(16), .y = flow(24), .z = flow(32)}};
-}
-
-}  // namespace
-
 void ColumnRuns::replace(std::int32_t low, std::int32_t high, LimitTail tail) {
     low = std::max(low, 0);
     high = std::min(high, top());
@@ -74,27 +60,25 @@ void ColumnRuns::cut(std::int32_t top) {
     }
 }
 
-void ColumnRuns::write(Limits& out, std::uint16_t void_id) const {
-    const std::size_t first = out.size();
-    out.resize(first + 3 * runs_.size() + 1);
-    Limit* to = out.data() + first;
+Limit* ColumnRuns::write(Limit* out, std::uint16_t void_id) const {
+    const Limit* const first = out;
     LimitTail shown = void_id;
     for (const Run& run : runs_) {
         const bool blends = run.middle > run.bottom;
         const LimitTail start = blends ? run.from : run.tail;
-        if (run.bottom > 0 && start == shown) {
-            to -= blends ? 0 : 1;  // goes on with what is there
+        if (out != first && start == shown) {
+            out -= blends ? 0 : 1;  // goes on with what is there
         } else {
-            *to++ = limit_of(run.bottom, start);
+            put_limit(out++, run.bottom, start);
         }
         if (blends && run.middle < run.top) {
-            *to++ = limit_of(run.middle, run.tail);
+            put_limit(out++, run.middle, run.tail);
         }
-        *to++ = limit_of(run.top, run.tail);
+        put_limit(out++, run.top, run.tail);
         shown = run.tail;
     }
-    *to++ = {.y256 = top(), .palette_id = void_id, .flow = {}};
-    out.resize(static_cast<std::size_t>(to - out.data()));
+    put_limit(out++, top(), void_id);
+    return out;
 }
 
 }  // namespace terrane

@@ -4,7 +4,9 @@
 
 #include "generator/volume/limit.h"
 
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -19,6 +21,13 @@ constexpr std::uint16_t palette_id_of(LimitTail tail) {
 
 constexpr LimitTail tail_of(std::uint16_t id, std::int32_t packed_flow) {
     return id | std::uint64_t{static_cast<std::uint32_t>(packed_flow)} << 16U;
+}
+
+inline void put_limit(Limit* to, std::int32_t y256, LimitTail tail) {
+    static_assert(sizeof(Limit) == sizeof y256 + sizeof tail && offsetof(Limit, palette_id) == 4 &&
+                  offsetof(Limit, flow) == 6);
+    std::memcpy(static_cast<void*>(to), &y256, sizeof y256);
+    std::memcpy(&to->palette_id, &tail, sizeof tail);
 }
 
 /// From bottom to top shows `tail`; up to `middle`, if that is above the bottom, it blends out of
@@ -58,8 +67,11 @@ class ColumnRuns {
     /// Removes everything above.
     void cut(std::int32_t top);
 
-    /// Appends the column's limits and the void's. Equal neighbours become one.
-    void write(Limits& out, std::uint16_t void_id) const;
+    /// Writes the column's limits and the void's and returns their end; at most limits_max().
+    /// Equal neighbours become one.
+    Limit* write(Limit* out, std::uint16_t void_id) const;
+
+    std::size_t limits_max() const { return 3 * runs_.size() + 1; }
 
     std::span<const Run> runs() const { return runs_; }
 

@@ -42,9 +42,21 @@ struct LayerHeights {
     std::size_t plane = 0;
 };
 
-/// height[i] = y of each value: where raw height `over[i]` above the bottom of the stack ends.
-/// `rest` is memory of as many values.
-void resist(float* height, float* rest, const float* over, const ResistanceConstants& constants,
-            const LayerHeights& layers, std::size_t count);
+/// Goes up through layer after layer, each of which must be there only when it is asked for.
+class ResistanceWalk {
+  public:
+    /// height[i] becomes y of each value: where raw height over[i] above the bottom of the stack
+    /// ends. `rest` is memory of as many values.
+    ResistanceWalk(float* height, float* rest, const float* over, std::size_t count);
+
+    /// Layer `k`, once it and those below it are there; from 0 on, each once. Whether some value is
+    /// left: else higher layers would add nothing.
+    bool pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k);
+
+  private:
+    float* height_;
+    float* rest_;
+    std::size_t count_;
+};
 
 }  // namespace terrane

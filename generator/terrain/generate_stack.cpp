@@ -65,17 +65,21 @@ StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
 StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
 
 Result<void> StackGenerator::build(const ColumnRectangle& rectangle) {
-    build_region(buffers_->region, *world_, buffers_->constants,
-                 buffers_->landscape ? Landscape::region_for(rectangle) : rectangle,
-                 buffers_->plots, *kernels_);
+    if (buffers_->landscape) {
+        begin_region(buffers_->region, *world_, rectangle, Landscape::kApron, buffers_->plots,
+                     *kernels_);
+        buffers_->landscape->build(buffers_->region, buffers_->constants, buffers_->plots,
+                                   *kernels_);
+    } else {
+        build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
+                     *kernels_);
+    }
     return check_elements(buffers_->region, *world_);
 }
 
-void StackGenerator::write(const ColumnWriterOutput& out, const ColumnRectangle& rectangle,
-                           std::int32_t apron) {
+void StackGenerator::write(const ColumnWriterOutput& out, std::int32_t apron) {
     if (buffers_->landscape) {
-        buffers_->landscape->write(out, buffers_->region, buffers_->constants, rectangle, apron,
-                                   *kernels_);
+        buffers_->landscape->write(out, buffers_->region, buffers_->constants, apron);
     } else {
         write_columns(out, buffers_->region, *world_, buffers_->constants, apron, *kernels_);
     }
@@ -102,7 +106,7 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
            .element_ids = buffers_->element_ids},
-          rectangle, 1);
+          1);
     return {};
 }
 
@@ -117,7 +121,7 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
            .element_ids = buffers_->element_ids},
-          rectangle, 0);
+          0);
     return {};
 }
 

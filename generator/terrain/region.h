@@ -1,7 +1,8 @@
 // One rectangle of columns, start to end: noise, heights, elements and flow as rasters.
 //
 // Rasters have one value a column, an apron of one column around the rectangle included (flow needs
-// the slope, meshes the neighbours). Every value is a function of (world, column) only.
+// the slope, meshes the neighbours); landscapes have a wider one. Every value is a function of
+// (world, column) only.
 #pragma once
 
 #include "generator/terrain/element.h"
@@ -42,9 +43,11 @@ struct PlacedElement {
 /// A worker's rasters and buffers; refilled by build_region.
 struct Region {
     ColumnRectangle inner;
-    RectangleShape shape;  ///< inner and its apron of one
+    RectangleShape shape;    ///< inner and its apron
+    std::int32_t apron = 1;  ///< columns
     std::int32_t flow_stride = 0;
-    bool elements_lift = true;   ///< veins and caves lift what is above them
+    std::size_t layers_built = 0;  ///< planes of `heights` and `y256` that hold their layers
+    bool elements_lift = true;     ///< veins and caves lift what is above them
     std::vector<float> stacked;  ///< S, the top of the stack so far
     std::vector<float> noise;
     std::vector<float> heights;            ///< K planes of shape.padded_size(): H_k
@@ -88,10 +91,22 @@ struct TerrainConstants {
     explicit TerrainConstants(const World& world);
 };
 
-/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results. A
-/// world with a landscape finds its blends later, and asks build_flow for the layers it shows.
+/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results.
 void build_region(Region& region, const World& world, const TerrainConstants& constants,
                   const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels);
+
+/// The same in steps, for landscapes, which cut much of the stack away and need no more than the
+/// rest: begins with no layer, and with elements only if they lift what is above them.
+void begin_region(Region& region, const World& world, const ColumnRectangle& rectangle,
+                  std::int32_t apron, PlotCache& plots, const RowKernels& kernels);
+
+/// Builds the layer above those that are there; needs no flow, and no blends.
+void build_layer(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
+
+/// Places elements that lift nothing, once the layers are there: those of gaps whose layer is built,
+/// as far as their layer's top lies below `shown256` in some column of shape.
+void place_elements(Region& region, const World& world, const std::int32_t* shown256,
+                    PlotCache& plots, const RowKernels& kernels);
 
 /// Fills one layer's plane of `region.flow`, once its heights are there.
 void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,
