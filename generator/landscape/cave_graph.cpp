@@ -96,6 +96,7 @@ Tube make_tube(const CaveConstants& constants, const CaveNode& from, const CaveN
         tube.x_max = p == 0 ? point.x + most : std::max(tube.x_max, point.x + most);
         tube.z_min = p == 0 ? point.z - most : std::min(tube.z_min, point.z - most);
         tube.z_max = p == 0 ? point.z + most : std::max(tube.z_max, point.z + most);
+        tube.y_min = p == 0 ? point.y - most : std::min(tube.y_min, point.y - most);
     }
     return tube;
 }

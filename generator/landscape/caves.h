@@ -65,6 +65,7 @@ struct Tube {
     float x_max = 0;
     float z_min = 0;
     float z_max = 0;
+    float y_min = 0;  ///< no floor is lower
 };
 
 /// A shaft to the sky and the funnel around its mouth.
@@ -102,9 +103,11 @@ struct CaveGap {
 /// The gaps of a rectangle's columns.
 class CaveField {
   public:
-    /// Overwrites the field; empty above level 0.
-    void build(const CaveConstants& constants, const CaveGraph& graph, const RectangleShape& shape,
-               const RowKernels& kernels, NoiseBuffers& buffers);
+    /// Overwrites the field: level 0's gaps as far as they begin under the ground.
+    void build(const CaveConstants& constants, const CaveGraph& graph, const float* ground,
+               const RectangleShape& shape, const RowKernels& kernels, NoiseBuffers& buffers);
+
+    void clear() { counts_.clear(); }
 
     std::span<const CaveGap> gaps(std::size_t i) const {
         if (counts_.empty()) {
@@ -115,7 +118,8 @@ class CaveField {
 
   private:
     void add(std::size_t i, CaveGap gap);
-    void add_tube(const Tube& tube, const RectangleShape& shape);
+    void add_tube(const Tube& tube, const float* ground, const RectangleShape& shape,
+                  const RowKernels& kernels);
 
     std::vector<std::uint8_t> counts_;
     std::vector<std::uint32_t> places_;
@@ -123,7 +127,8 @@ class CaveField {
     std::uint32_t pool_used_ = 0;
     std::vector<float> rough_;
     std::vector<float> ragged_;
-    std::vector<CaveGap> tube_;  ///< of one tube, while it is being added
+    std::vector<float> tube_floor_;  ///< of one tube, while it is being added
+    std::vector<float> tube_lid_;
 };
 
 /// Lowers the ground around the mouths of dolines; `allowed` is 0 where water would run in and 1

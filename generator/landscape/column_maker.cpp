@@ -20,6 +20,7 @@ constexpr float kSnow = 2.2F;         ///< voxels
 constexpr float kSnowLineNoise = 22;  ///< voxels
 constexpr float kLeastCover = 0.25F;  ///< voxels
 constexpr float kSandWidths = 2.2F;   ///< half widths of a river
+constexpr float kLeastSand = 1.2F;    ///< voxels
 constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
 
 std::int32_t to_256(float voxels) {
@@ -180,37 +181,74 @@ struct ColumnMaker::Cover {
     std::uint16_t snow = LandscapePalette::kNoEntry;
 };
 
-ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
+/// Tops and covers of the columns of a row, side by side so that it goes by vectors.
+void ColumnMaker::begin_row(std::int32_t z) {
     const LandscapeConstants& constants = sources_.constants;
-    const auto stride = static_cast<std::size_t>(sources_.region.shape.stride());
-    const float per_column = 0.5F / static_cast<float>(sources_.region.shape.step);
-    const float* const ground = sources_.ground.data() + place.at;
-    const float slope_x = (ground[1] - ground[-1]) * per_column;
-    const float slope_z = (ground[stride] - *(ground - stride)) * per_column;
-    const float square = slope_x * slope_x + slope_z * slope_z;
-    const float noise = sources_.soil[place.at];
-    Cover cover;
-    const auto lay = [&](std::uint16_t& as, std::int32_t& from, std::uint16_t id, float thickness) {
-        if (id != LandscapePalette::kNoEntry && thickness >= kLeastCover) {
-            as = id;
-            from = std::max(0, place.top256 - to_256(thickness));
-        }
-    };
-    const float soil = constants.soil * (1.0F - square / kSteepestSoil) *
-                       (0.6F + 0.4F * clamp01(1.0F - sources_.crest[place.at])) *
-                       (1.0F + 0.6F * noise);
-    const bool by_river = sources_.channels.nearness[place.at] < kSandWidths;
-    const bool by_sea = place.ground < constants.sea + kBeach;
-    if ((by_river || by_sea) && square < kSteepestSnow) {
-        lay(cover.soil, cover.soil_from, constants.palette.sand, std::max(1.2F, soil));
-    } else {
-        lay(cover.soil, cover.soil_from, constants.palette.soil, soil);
+    const RectangleShape& shape = sources_.region.shape;
+    const std::ptrdiff_t stride = shape.stride();
+    const std::ptrdiff_t first = (z + sources_.region.apron) * stride;
+    const float* __restrict const banks = sources_.banks.data() + first;
+    const std::int32_t count = shape.width;
+    std::int32_t* __restrict const top256 = row_.top256.data();
+    for (std::int32_t i = 0; i < count; ++i) {
+        top256[i] = std::max(to_256(banks[i]), 2 * kUnitsPerVoxel);
     }
-    if (constants.has_snow && place.water == kNoWater) {
-        const float above =
-            (place.ground - constants.snow_line + kSnowLineNoise * noise) * (1.0F / 12.0F);
-        lay(cover.snow, cover.snow_from, constants.palette.snow,
-            kSnow * clamp01(above) * (1.0F - square / kSteepestSnow));
+    if (!constants.has_relief) {
+        return;
+    }
+    const float per_column = 0.5F / static_cast<float>(shape.step);
+    const float* __restrict const ground = sources_.ground.data() + first;
+    const float* __restrict const before = ground - stride;
+    const float* __restrict const after = ground + stride;
+    const float* __restrict const noise = sources_.soil.data() + first;
+    const float* __restrict const crest = sources_.crest.data() + first;
+    const float* __restrict const nearness = sources_.channels.nearness.data() + first;
+    const float* __restrict const water = sources_.channels.water.data() + first;
+    std::int32_t* __restrict const soil256 = row_.soil256.data();
+    std::int32_t* __restrict const snow256 = row_.snow256.data();
+    std::int32_t* __restrict const is_sand = row_.is_sand.data();
+    const auto thickness256 = [](float thickness) {
+        return thickness >= kLeastCover ? to_256(thickness) : 0;
+    };
+    const float most_soil = constants.soil;
+    const float beach = constants.sea + kBeach;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
+        const float slope_z = (after[i] - before[i]) * per_column;
+        const float square = slope_x * slope_x + slope_z * slope_z;
+        const float soil = most_soil * (1.0F - square / kSteepestSoil) *
+                           (0.6F + 0.4F * clamp01(1.0F - crest[i])) * (1.0F + 0.6F * noise[i]);
+        const auto by_water = static_cast<std::int32_t>(nearness[i] < kSandWidths) |
+                              static_cast<std::int32_t>(banks[i] < beach);
+        const std::int32_t sand = by_water & static_cast<std::int32_t>(square < kSteepestSnow);
+        is_sand[i] = sand;
+        soil256[i] = thickness256(sand != 0 ? std::max(kLeastSand, soil) : soil);
+    }
+    if (!constants.has_snow) {
+        return;
+    }
+    const float snow_line = constants.snow_line;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
+        const float slope_z = (after[i] - before[i]) * per_column;
+        const float square = slope_x * slope_x + slope_z * slope_z;
+        const float above = (banks[i] - snow_line + kSnowLineNoise * noise[i]) * (1.0F / 12.0F);
+        const float snow = kSnow * clamp01(above) * (1.0F - square / kSteepestSnow);
+        snow256[i] = water[i] == kNoWater ? thickness256(snow) : 0;
+    }
+}
+
+ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
+    const LandscapePalette& palette = sources_.constants.palette;
+    const auto i = static_cast<std::size_t>(place.column);
+    Cover cover;
+    if (row_.soil256[i] > 0) {
+        cover.soil = row_.is_sand[i] != 0 ? palette.sand : palette.soil;
+        cover.soil_from = std::max(0, place.top256 - row_.soil256[i]);
+    }
+    if (sources_.constants.has_snow && row_.snow256[i] > 0) {
+        cover.snow = palette.snow;
+        cover.snow_from = std::max(0, place.top256 - row_.snow256[i]);
     }
     return cover;
 }
@@ -305,7 +343,7 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
                                                 place.row * sources_.field.stride() + place.column);
     place.ground = sources_.banks[place.at];
     place.water = sources_.channels.water[place.at];
-    place.top256 = std::max(to_256(place.ground), 2 * kUnitsPerVoxel);
+    place.top256 = row_.top256[static_cast<std::size_t>(place.column)];
     if (has_flow) {
         place.flow = region.flow.data() + static_cast<std::ptrdiff_t>(z) * region.flow_stride + x;
         place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());

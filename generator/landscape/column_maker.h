@@ -9,6 +9,7 @@
 #include "generator/landscape/column_runs.h"
 #include "generator/landscape/landscape.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -41,6 +42,9 @@ class ColumnMaker {
     ColumnMaker(const ColumnSources& sources, std::span<std::uint16_t> element_ids)
         : sources_(sources), element_ids_(element_ids) {}
 
+    /// Before the columns of a row.
+    void begin_row(std::int32_t z);
+
     /// Writes column (x, z), counted from the rectangle's corner, -1 being its apron, behind the
     /// first `used` limits; returns how many there are then. What is behind them is no column's.
     std::size_t write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
@@ -67,6 +71,14 @@ class ColumnMaker {
     ColumnSources sources_;
     std::span<std::uint16_t> element_ids_;
     ColumnRuns runs_;
+
+    /// Of a row of the region's shape; heights and thicknesses in 1/256 voxel.
+    struct Row {
+        std::array<std::int32_t, kRectangleSideMax> top256{};
+        std::array<std::int32_t, kRectangleSideMax> soil256{};  ///< or sand; 0: none
+        std::array<std::int32_t, kRectangleSideMax> snow256{};
+        std::array<std::int32_t, kRectangleSideMax> is_sand{};
+    } row_;
 };
 
 }  // namespace terrane

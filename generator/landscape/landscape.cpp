@@ -275,7 +275,7 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
                           .fine = fine_.data()},
                          region, constants, ground_.data(), kernels, noise_);
     } else {
-        overhangs_ = {};
+        overhangs_.clear();
     }
     if (constants_.has_relief) {
         for (std::vector<float>* raster :
@@ -292,13 +292,15 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
         for (float& ground : ground_) {
             ground = std::max(2.0F, ground);
         }
-        caves_.build(constants_.caves, cave_graph_, shape, kernels, noise_);
-    } else {
-        caves_ = {};
     }
     cut_channels(ground_.data(), channels_, constants_.channels, relief_, relief_builder_.rivers(),
                  shape);
     raise_banks(region);
+    if (shape.step == 1 && constants_.caves.cell > 0) {
+        caves_.build(constants_.caves, cave_graph_, banks_.data(), shape, kernels, noise_);
+    } else {
+        caves_.clear();
+    }
     build_shown(region, constants, kernels, plots);
     if (constants_.has_relief) {
         soil_.resize(shape.padded_size());
@@ -336,6 +338,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
                       out.element_ids);
     std::size_t used = 0;
     for (std::int32_t z = -apron; z < rectangle.length + apron; ++z) {
+        maker.begin_row(z);
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
             const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
             used = maker.write(grid.limits, used, x, z, is_inner);

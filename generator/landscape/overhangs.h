@@ -54,6 +54,8 @@ class OverhangField {
                const OverhangInput& input, Region& region, const TerrainConstants& terrain,
                const float* ground, const RowKernels& kernels, NoiseBuffers& buffers);
 
+    void clear() { overhangs_.clear(); }
+
     const Overhang* at(std::size_t i) const {
         return overhangs_.empty() || overhangs_[i].layer < 0 ? nullptr : &overhangs_[i];
     }

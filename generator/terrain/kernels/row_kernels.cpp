@@ -465,6 +465,44 @@ void valleys(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count
     }
 }
 
+void tube(const TubeRow& row, const TubePiece& piece) {
+    constexpr float kFlatFloor = 0.62F;
+    constexpr float kCeiling = 0.95F;
+    for (std::int32_t first = 0; first < row.count; first += kBlock) {
+        float* __restrict const floor = row.floor + first;
+        float* __restrict const lid = row.lid + first;
+        const float* __restrict const rough = row.rough + first;
+        const float* __restrict const ragged = row.ragged + first;
+        const float az = row.z - piece.z;
+        const std::int32_t left = row.count - first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float ax = (row.x + static_cast<float>(first + i)) - piece.x;
+            const float t = clamp01((ax * piece.ex + az * piece.ez) * piece.inverse_square);
+            const float qx = ax - t * piece.ex;
+            const float qz = az - t * piece.ez;
+            const float r =
+                (piece.radius + t * piece.dr) * (1.0F + 0.25F * rough[i] + 0.15F * ragged[i]);
+            const float rest = r * r - (qx * qx + qz * qz);
+            const float hh = __builtin_sqrtf(rest > 0.0F ? rest : 0.0F);
+            const float up = kCeiling * (1.0F + 0.5F * ragged[i]);
+            const float y = piece.y + t * piece.dy;
+            const float reach = hh * piece.steep;
+            const float high = y + up * reach;
+            const float high_most = piece.y_max + up * hh;
+            const float new_lid = high < high_most ? high : high_most;
+            const float low = y - kFlatFloor * reach;
+            const float low_least = piece.y_min - kFlatFloor * hh;
+            const float new_floor = low > low_least ? low : low_least;
+            // A column of another row, or out of the tube, keeps what it has.
+            const bool is_in = static_cast<int>(rest > 0.0F) & static_cast<int>(i < left);
+            const float lid_here = is_in ? new_lid : -3.0e38F;
+            const float floor_here = is_in ? new_floor : 3.0e38F;
+            lid[i] = lid[i] < lid_here ? lid_here : lid[i];
+            floor[i] = floor[i] > floor_here ? floor_here : floor[i];
+        }
+    }
+}
+
 }  // namespace
 
 extern const RowKernels kKernels;
@@ -477,6 +515,7 @@ const RowKernels kKernels = {.gradients = gradients,
                              .plain_columns = plain_columns,
                              .element_tile = element_tile,
                              .erode = erode,
-                             .valleys = valleys};
+                             .valleys = valleys,
+                             .tube = tube};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -134,6 +134,34 @@ struct ValleyConstants {
     float plateau = 0;
 };
 
+/// A straight piece of a cave's tube, see generator/landscape/caves.h; columns from the tube's
+/// origin, voxels.
+struct TubePiece {
+    float x = 0;
+    float z = 0;
+    float ex = 0;  ///< to the piece's end, likewise the other changes
+    float ez = 0;
+    float inverse_square = 0;  ///< 1 / |e|^2, or 0
+    float y = 0;
+    float dy = 0;
+    float radius = 0;
+    float dr = 0;
+    float steep = 1;  ///< sqrt(1 + slope^2)
+    float y_min = 0;
+    float y_max = 0;
+};
+
+/// Columns side by side; whole blocks of the arrays can be written, though `count` values are.
+struct TubeRow {
+    float* floor = nullptr;
+    float* lid = nullptr;
+    const float* rough = nullptr;  ///< noise of walls
+    const float* ragged = nullptr;
+    float x = 0;  ///< of the first column, from the tube's origin
+    float z = 0;
+    std::int32_t count = 0;
+};
+
 struct RowKernels {
     /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
     /// the top four bits of mix(hash ^ row_value) number the sixteen unit vectors. Whole blocks.
@@ -171,6 +199,8 @@ struct RowKernels {
     /// order.
     void (*valleys)(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count,
                     const ValleyConstants& constants);
+    /// Lowers floors and raises lids to what a piece of a tube hollows out.
+    void (*tube)(const TubeRow& row, const TubePiece& piece);
 };
 
 namespace kernels_scalar {
