@@ -208,9 +208,8 @@ ErosionConstants::ErosionConstants(const WorldDefinition& definition) {
             .period = period,
             .amplitude = static_cast<float>(amplitude),
             .steepening = static_cast<float>(0.5 * amplitude * 6.28318530718 * 0.75 / period)};
-        if (octave_count <= kCoarseOctaves) {
-            coarse_amplitude += static_cast<float>(amplitude);
-        }
+        (octave_count <= kCoarseOctaves ? coarse_amplitude : fine_amplitude) +=
+            static_cast<float>(amplitude);
         if (period >= kHalvedPeriod) {
             halved_count = octave_count;
         }
@@ -221,6 +220,15 @@ ErosionConstants::ErosionConstants(const WorldDefinition& definition) {
 
 void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConstants& constants,
            const RectangleShape& shape, const RowKernels& kernels, ErosionBuffers& buffers) {
+    if (!relief.is_smooth) {
+        // Nothing says which way the slopes run: what the stripes tend to where there are none.
+        for (std::size_t i = 0; i < shape.padded_size(); ++i) {
+            const float fade = std::min(1.0F, std::max(-1.0F, 2.0F * relief.crest[i] - 1.0F));
+            coarse[i] = constants.coarse_amplitude + constants.coarse_amplitude * fade;
+            fine[i] = constants.fine_amplitude * fade;
+        }
+        return;
+    }
     const bool is_halved = shape.step == 1 && constants.halved_count > 0;
     const RectangleShape half = halved(shape);
     const RectangleShape& first = is_halved ? half : shape;

@@ -46,6 +46,7 @@ struct ErosionConstants {
     std::size_t octave_count = 0;
     std::size_t halved_count = 0;  ///< the first so many are found on every second column
     float coarse_amplitude = 0;    ///< sum of the coarse octaves'
+    float fine_amplitude = 0;      ///< likewise
 
     explicit ErosionConstants(const WorldDefinition& definition);
 };

@@ -90,12 +90,7 @@ void Landscape::build_fields(const Region& region, const RowKernels& kernels) {
         return;
     }
     relief_builder_.build(relief_, constants_.relief, field_, kernels, noise_);
-    if (relief_.has_rivers) {
-        erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
-    } else {
-        std::fill(raw_.begin(), raw_.end(), constants_.erosion.coarse_amplitude);
-        std::fill(fine_.begin(), fine_.end(), 0.0F);
-    }
+    erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
     for (std::size_t i = 0; i < size; ++i) {
         raw_[i] = relief_.ground[i] + relief_.mountain[i] * raw_[i];
         fine_[i] = relief_.mountain[i] * fine_[i];

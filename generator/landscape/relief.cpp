@@ -11,9 +11,27 @@
 namespace terrane {
 namespace {
 
-constexpr std::size_t kValues = 4;      ///< of a lattice point: g, hr, pf, vm
-constexpr std::size_t kTilePoints = 4;  ///< a tile's side, in lattice points
-static_assert(kTilePoints * kTilePoints == kVectorPad);
+constexpr std::int64_t kSmoothSteps = 4;  ///< a valley is so many steps wide where it is smoothed
+constexpr std::size_t kValues = 6;  ///< of a lattice point: g, hr, pf, vm, and how it is moved
+
+/// So many lattice points each way are weighed together, as far as there are so many.
+struct TileSides {
+    std::size_t x = 4;
+    std::size_t z = 4;
+};
+
+/// The sides that need the fewest tiles; a tile has at most kVectorPad points.
+TileSides tile_sides(std::size_t lines_x, std::size_t lines_z) {
+    constexpr std::array<TileSides, 3> kShapes = {{{.x = 4, .z = 4}, {.x = 5, .z = 3}, {.x = 3, .z = 5}}};
+    const auto tiles = [&](const TileSides& sides) {
+        return ((lines_x + sides.x - 1) / sides.x) * ((lines_z + sides.z - 1) / sides.z);
+    };
+    TileSides best = kShapes[0];
+    for (const TileSides& sides : kShapes) {
+        best = tiles(sides) < tiles(best) ? sides : best;
+    }
+    return best;
+}
 
 /// Weights of the four lattice points around a place, and their slopes a column.
 struct Taps {
@@ -36,7 +54,8 @@ Taps taps_at(std::int64_t eighths) {
 using AllTaps = std::array<Taps, kLatticeStep>;
 
 /// A row of columns next to each other, from values of its lattice columns, `lines` a plane: cell
-/// by cell, in which the four points are the same.
+/// by cell, in which the four points are the same. A last cell that is cut runs over into columns
+/// that come later.
 void mix_columns(const std::array<float*, kValues + 1>& to, float* slope_x, const float* mixed,
                  std::size_t lines, const AllTaps& taps, std::int32_t first_eighth,
                  std::int32_t width) {
@@ -49,25 +68,33 @@ void mix_columns(const std::array<float*, kValues + 1>& to, float* slope_x, cons
             slope[p][e] = taps[e].slope[p];
         }
     }
-    const auto mix_cell = [](float* out, const float* value, const auto& share, std::int32_t from,
-                             std::int32_t count) {
+    const auto mix_cell = [](float* __restrict out, const float* value, const auto& share,
+                             std::int32_t from) {
         std::array<float, kLatticeStep> sum;
         for (std::size_t e = 0; e < kLatticeStep; ++e) {
             sum[e] = share[0][e] * value[0] + share[1][e] * value[1] + share[2][e] * value[2] +
                      share[3][e] * value[3];
         }
-        std::copy_n(sum.data() + from, count, out);
-    };
-    std::int32_t from = first_eighth;
-    for (std::int32_t column = 0; column < width; ++mixed) {
-        const std::int32_t count = std::min(kStep - from, width - column);
-        for (std::size_t v = 0; v <= kValues; ++v) {
-            mix_cell(to[v] + column, mixed + v * lines, weight, from, count);
+        if (from == 0) {
+            std::copy(sum.begin(), sum.end(), out);
+        } else {
+            for (std::int32_t e = from; e < kStep; ++e) {
+                out[e - from] = sum[static_cast<std::size_t>(e)];
+            }
         }
-        mix_cell(slope_x + column, mixed, slope, from, count);
-        column += count;
-        from = 0;
+    };
+    const auto mix = [&](float* out, const float* values, const auto& share) {
+        std::int32_t from = first_eighth;
+        for (std::int32_t column = 0; column < width; ++values) {
+            mix_cell(out + column, values, share, from);
+            column += kStep - from;
+            from = 0;
+        }
+    };
+    for (std::size_t v = 0; v <= kValues; ++v) {
+        mix(to[v], mixed + v * lines, weight);
     }
+    mix(slope_x, mixed, slope);
 }
 
 /// A place moved by the noise that makes rivers wind.
@@ -98,13 +125,20 @@ struct ReliefBuilder::Axis {
     std::vector<std::int64_t> lines;   ///< columns of the lattice's lines, ascending
     std::vector<std::int32_t> first;   ///< per column: entry of its first point
     std::vector<std::uint8_t> eighth;  ///< per column: how far behind its second point
-    std::size_t points = 4;            ///< of which a column's value is made
+    std::size_t points = 4;            ///< of which a column's value is made: 1, 3 or 4
 
     std::size_t stride() const {
         return static_cast<std::size_t>(padded_width(static_cast<std::int32_t>(lines.size())));
     }
 
-    Axis(std::int64_t start, std::int32_t count, std::int64_t step) {
+    Axis(std::int64_t start, std::int32_t count, std::int64_t step, bool is_smooth) {
+        if (!is_smooth) {
+            points = 1;
+            for (std::int32_t i = 0; i < count; ++i) {
+                lines.push_back(floor_div(start + i * step, kLatticeStep) * kLatticeStep);
+            }
+            return;
+        }
         // Right on a line the fourth point weighs nothing.
         points = start % kLatticeStep == 0 && step % kLatticeStep == 0 ? 3 : 4;
         std::int64_t newest = 0;
@@ -148,14 +182,14 @@ void ReliefBuilder::find_rivers(const RiverConstants& constants, const Rectangle
 }
 
 void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                              std::size_t first_x, std::size_t first_z, const RowKernels& kernels) {
+                              const LatticeTile& tile, const RowKernels& kernels) {
     const RiverConstants& rivers = constants.rivers;
     const std::size_t stride = x.stride();
     const std::size_t plane = stride * z.lines.size() + kVectorPad;
-    const float* const wander_x = lattice_.data() + kValues * plane;
+    const float* const wander_x = lattice_.data() + 4 * plane;
     const float* const wander_z = wander_x + plane;
-    const std::int64_t origin_x = x.lines[first_x];
-    const std::int64_t origin_z = z.lines[first_z];
+    const std::int64_t origin_x = x.lines[tile.first_x];
+    const std::int64_t origin_z = z.lines[tile.first_z];
     ValleyPlaces places;
     std::array<MovedPlace, kVectorPad> moved_to;
     std::array<std::size_t, kVectorPad> at;
@@ -164,12 +198,13 @@ void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, c
     std::int64_t z_min = INT64_MAX;
     std::int64_t z_max = INT64_MIN;
     for (std::size_t n = 0; n < kVectorPad; ++n) {
-        // Beyond the lattice's end, its last points once more.
-        const std::size_t line_x = std::min(first_x + n % kTilePoints, x.lines.size() - 1);
-        const std::size_t line_z = std::min(first_z + n / kTilePoints, z.lines.size() - 1);
+        // Beyond the tile's or the lattice's end, the last points once more.
+        const std::size_t row = std::min(n / tile.width, tile.length - 1);
+        const std::size_t line_x = std::min(tile.first_x + n % tile.width, x.lines.size() - 1);
+        const std::size_t line_z = std::min(tile.first_z + row, z.lines.size() - 1);
         at[n] = line_z * stride + line_x;
-        moved_to[n] = moved(x.lines[line_x], z.lines[line_z], rivers.wander * wander_x[at[n]],
-                            rivers.wander * wander_z[at[n]]);
+        moved_to[n] =
+            moved(x.lines[line_x], z.lines[line_z], wander_x[at[n]], wander_z[at[n]]);
         const MovedPlace& place = moved_to[n];
         places.x[n] = static_cast<float>(place.x - origin_x);
         places.z[n] = static_cast<float>(place.z - origin_z);
@@ -219,7 +254,7 @@ void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, c
 void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                                  const RowKernels& kernels, NoiseBuffers& buffers) {
     const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
-    lattice_.resize(std::max(lattice_.size(), plane * (kValues + 2)));
+    lattice_.resize(std::max(lattice_.size(), plane * kValues));
     float* const ground = lattice_.data();
     float* const river = ground + plane;
     float* const crest = river + plane;
@@ -227,9 +262,15 @@ void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x
     noise_grid(mountain, constants.mountains, x.lines, z.lines, kernels, buffers);
     noise_grid(mountain + plane, constants.rivers.wander_x, x.lines, z.lines, kernels, buffers);
     noise_grid(mountain + 2 * plane, constants.rivers.wander_z, x.lines, z.lines, kernels, buffers);
-    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += kTilePoints) {
-        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += kTilePoints) {
-            fill_tile(constants, x, z, line_x, line_z, kernels);
+    for (float* value = mountain + plane; value < mountain + 3 * plane; ++value) {
+        *value *= constants.rivers.wander;
+    }
+    const TileSides sides = tile_sides(x.lines.size(), z.lines.size());
+    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += sides.z) {
+        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += sides.x) {
+            fill_tile(constants, x, z,
+                      {.first_x = line_x, .first_z = line_z, .width = sides.x, .length = sides.z},
+                      kernels);
         }
     }
     for (std::size_t line_z = 0; line_z < z.lines.size(); ++line_z) {
@@ -260,20 +301,33 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             out.crest[i] = kMeanCrest;
             out.ground[i] = out.river[i] + constants.height * out.mountain[i] * kMeanCrest;
         }
+        out.is_smooth = false;
         std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
         std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
         return;
     }
     find_rivers(constants.rivers, shape);
-    const Axis x(shape.x0, shape.width, shape.step);
-    const Axis z(shape.z0, shape.length, shape.step);
+    out.is_smooth = shape.step <= constants.rivers.cell_x / kSmoothSteps;
+    const Axis x(shape.x0, shape.width, shape.step, out.is_smooth);
+    const Axis z(shape.z0, shape.length, shape.step, out.is_smooth);
     fill_lattice(constants, x, z, kernels, buffers);
+    if (!out.is_smooth) {
+        // Lattice and columns are one, row by row of the same stride.
+        const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
+        const std::array<std::vector<float>*, kValues> to = {
+            &out.ground, &out.river, &out.crest, &out.mountain, &out.wander_x, &out.wander_z};
+        for (std::size_t v = 0; v < kValues; ++v) {
+            std::copy_n(lattice_.data() + v * plane, size, to[v]->begin());
+        }
+        std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
+        std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
+        return;
+    }
     AllTaps taps;
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
-    // Rows of the lattice first, mixed along z: five values a lattice column, g's slope along z
-    // too.
+    // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z too.
     const std::size_t lines = x.stride();
     const std::size_t plane = lines * z.lines.size() + kVectorPad;
     mixed_.resize(std::max(mixed_.size(), lines * (kValues + 1)));
@@ -299,8 +353,9 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
         }
         const auto first = static_cast<std::size_t>(row * shape.stride());
         const std::array<float*, kValues + 1> to = {
-            out.ground.data() + first, out.river.data() + first, out.crest.data() + first,
-            out.mountain.data() + first, out.slope_z.data() + first};
+            out.ground.data() + first,   out.river.data() + first,    out.crest.data() + first,
+            out.mountain.data() + first, out.wander_x.data() + first, out.wander_z.data() + first,
+            out.slope_z.data() + first};
         if (shape.step == 1) {
             mix_columns(to, out.slope_x.data() + first, mixed_.data(), lines, taps,
                         x.eighth.front(), shape.width);
@@ -322,12 +377,6 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             }
             out.slope_x[first + static_cast<std::size_t>(column)] = sum[kValues + 1];
         }
-    }
-    noise_rectangle(out.wander_x.data(), constants.rivers.wander_x, shape, kernels, buffers);
-    noise_rectangle(out.wander_z.data(), constants.rivers.wander_z, shape, kernels, buffers);
-    for (std::size_t i = 0; i < size; ++i) {
-        out.wander_x[i] *= constants.rivers.wander;
-        out.wander_z[i] *= constants.rivers.wander;
     }
 }
 

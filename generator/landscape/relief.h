@@ -11,9 +11,11 @@
 //
 // The sum is a smooth minimum of distances, so that valleys meet in crests (Genevaux et al. 2013)
 // without sorting or a pass over the map. Only reaches of nodes at most kRiverReachCells away come
-// so near; 4 x 4 points of the lattice at a time look at those whose boxes come near one of them.
-// Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient. Levels whose step
-// exceeds the valley take the mean between river and crest.
+// so near; some 4 x 4 points of the lattice at a time look at those whose boxes come near one of
+// them. Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient; so do they take
+// how far a place is moved before a river is sought. Levels whose step exceeds a quarter of the
+// valley take the value of one point; levels whose step exceeds the valley take the mean between
+// river and crest.
 #pragma once
 
 #include "generator/landscape/river_graph.h"
@@ -49,6 +51,7 @@ struct ReliefRasters {
     std::vector<float> wander_x;  ///< columns by which the place is moved before a river is sought
     std::vector<float> wander_z;
     bool has_rivers = false;  ///< false at levels that are too coarse for them
+    bool is_smooth = false;   ///< false: there are no slopes
 };
 
 /// Builds relief for one worker; keeps its rivers and buffers.
@@ -62,11 +65,19 @@ class ReliefBuilder {
   private:
     struct Axis;
 
+    /// Points of the lattice that are weighed together.
+    struct LatticeTile {
+        std::size_t first_x = 0;
+        std::size_t first_z = 0;
+        std::size_t width = 0;
+        std::size_t length = 0;
+    };
+
     void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
     void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                       const RowKernels& kernels, NoiseBuffers& buffers);
     void fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                   std::size_t first_x, std::size_t first_z, const RowKernels& kernels);
+                   const LatticeTile& tile, const RowKernels& kernels);
 
     RiverGraph rivers_;
     std::vector<float> lattice_;    ///< planes of g, hr, pf, vm and how a place is moved in x and z
