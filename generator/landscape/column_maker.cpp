@@ -46,56 +46,58 @@ struct ColumnMaker::Place {
     }
 };
 
-void ColumnMaker::add_layers(const Place& place, std::int32_t moved256,
-                             std::int32_t block_top) {
-    const std::size_t plane = sources_.region.plane_size();
-    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
-    const std::size_t layers = sources_.rules.size();
-    std::int32_t bottom = runs_.top();
-    const std::int32_t block_bottom = bottom;
-    LimitTail below = 0;
-    bool below_alone = true;
-    for (std::size_t k = 0; k < layers && bottom < block_top; ++k, y256 += plane) {
-        const std::int32_t top = *y256 + moved256;
-        if (top <= bottom) {
-            continue;
-        }
-        const LayerRules& rule = sources_.rules[k];
-        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), place.flow_of(k));
-        const bool blends = bottom > block_bottom && !below_alone && !rule.alone && rule.blend > 0;
-        const std::int32_t blend =
-            blends ? std::max(1, ((top - bottom) * rule.blend + 128) >> 8) : 0;
-        const std::int32_t end = std::min(top, block_top);
-        runs_.push({.bottom = bottom,
-                  .top = end,
-                  .middle = std::min(bottom + blend, end),
-                  .tail = tail,
-                  .from = below});
-        bottom = end;
-        below = tail;
-        below_alone = rule.alone;
+/// The planes that pass under the ground part the column.
+void ColumnMaker::find_blocks(const Place& place) {
+    const auto planes = sources_.fractures.planes(place.field_at);
+    const float fold = sources_.folds[place.field_at];
+    if (planes.empty()) {
+        blocks_[0] = {.bottom = 0, .top = place.top256, .moved = to_256(fold)};
+        block_count_ = 1;
+        return;
     }
-    if (bottom < block_top) {  // the stack ends below the ground
-        const std::uint16_t soil = sources_.constants.palette.soil;
-        const auto last = static_cast<std::uint16_t>(layers - 1);
-        runs_.push({.bottom = bottom,
-                  .top = block_top,
-                  .middle = bottom,
-                  .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
-                                  place.flow_of(layers - 1)),
-                  .from = 0});
+    std::array<float, kPlanesPerColumnMax + 1> tops{};
+    std::size_t count = 0;
+    for (const PlaneInColumn& plane : planes) {
+        if (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground) {
+            std::size_t place_of = count++;
+            for (; place_of > 0 && tops[place_of - 1] > plane.y; --place_of) {
+                tops[place_of] = tops[place_of - 1];
+            }
+            tops[place_of] = plane.y;
+        }
+    }
+    tops[count++] = place.ground;
+    float bottom = 0;
+    std::int32_t bottom256 = 0;
+    block_count_ = 0;
+    for (std::size_t b = 0; b < count; ++b) {
+        // A plane at the block's bottom lies below it.
+        float moved = fold;
+        for (const PlaneInColumn& plane : planes) {
+            moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
+        }
+        const std::int32_t top256 =
+            b + 1 == count ? place.top256 : std::min(to_256(tops[b]), place.top256);
+        if (top256 > bottom256) {
+            blocks_[block_count_++] = {
+                .bottom = bottom256, .top = top256, .moved = to_256(moved)};
+            bottom256 = top256;
+        }
+        bottom = tops[b];
     }
 }
 
-void ColumnMaker::add_lenses(const Place& place, std::int32_t moved256,
-                             std::int32_t block_bottom) {
+void ColumnMaker::find_lenses(const Place& place, const Block& block) {
     const Region& region = sources_.region;
     std::uint64_t gaps = region.gap_mask[place.at];
     for (std::size_t gap = 0; gaps != 0; ++gap, gaps >>= 1U) {
         if ((gaps & 1U) == 0) {
             continue;
         }
-        const std::int32_t base = region.y256[gap * region.plane_size() + place.at] + moved256;
+        const std::int32_t base = region.y256[gap * region.plane_size() + place.at] + block.moved;
+        if (base >= block.top) {
+            break;  // higher gaps lie higher
+        }
         const std::size_t end =
             gap + 1 < sources_.rules.size() ? region.gap_begin[gap + 1] : region.elements.size();
         for (std::size_t e = region.gap_begin[gap]; e < end; ++e) {
@@ -109,8 +111,8 @@ void ColumnMaker::add_lenses(const Place& place, std::int32_t moved256,
                 region.thickness[element.raster + static_cast<std::size_t>(z * element.stride + x)];
             if (thickness > 0) {
                 const bool is_cave = element.element().type == ElementType::cave;
-                runs_.replace(
-                    std::max(base, block_bottom), base + to_256(thickness),
+                overlays_.add(
+                    std::max(base, block.bottom), std::min(base + to_256(thickness), block.top),
                     tail_of(static_cast<std::uint16_t>(sources_.world.base_palette.size() + e),
                             is_cave ? 0 : place.flow_of(gap)));
             }
@@ -118,40 +120,7 @@ void ColumnMaker::add_lenses(const Place& place, std::int32_t moved256,
     }
 }
 
-void ColumnMaker::add_blocks(const Place& place) {
-    const auto planes = sources_.fractures.planes(place.field_at);
-    const float fold = sources_.folds[place.field_at];
-    std::array<float, kPlanesPerColumnMax + 1> tops{};
-    std::size_t blocks = 0;
-    for (const PlaneInColumn& plane : planes) {
-        if (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground) {
-            std::size_t place_of = blocks++;
-            for (; place_of > 0 && tops[place_of - 1] > plane.y; --place_of) {
-                tops[place_of] = tops[place_of - 1];
-            }
-            tops[place_of] = plane.y;
-        }
-    }
-    tops[blocks++] = place.ground;
-    float bottom = 0;
-    for (std::size_t b = 0; b < blocks; ++b) {
-        // A plane at the block's bottom lies below it.
-        float moved = fold;
-        for (const PlaneInColumn& plane : planes) {
-            moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
-        }
-        const std::int32_t block_bottom = runs_.top();
-        const std::int32_t block_top =
-            b + 1 == blocks ? place.top256 : std::min(to_256(tops[b]), place.top256);
-        if (block_top > block_bottom) {
-            add_layers(place, to_256(moved), block_top);
-            add_lenses(place, to_256(moved), block_bottom);
-        }
-        bottom = tops[b];
-    }
-}
-
-void ColumnMaker::add_sheets(const Place& place) {
+void ColumnMaker::find_sheets(const Place& place) {
     const auto& fillings = sources_.constants.palette.fillings;
     if (fillings.empty()) {
         return;
@@ -160,25 +129,24 @@ void ColumnMaker::add_sheets(const Place& place) {
         if (plane.half_sheet <= 0) {
             continue;
         }
-        const std::int32_t low = to_256(plane.y - plane.half_sheet);
-        const std::int32_t high = to_256(plane.y + plane.half_sheet);
-        if (low >= place.top256 || high <= 0) {
+        const std::int32_t low = std::max(0, to_256(plane.y - plane.half_sheet));
+        const std::int32_t high = std::min(to_256(plane.y + plane.half_sheet), place.top256);
+        if (low >= high) {
             continue;
         }
         const auto& filling = fillings[plane.filling % fillings.size()];
         const std::int32_t flow = place.flow_of(0);
         const std::int32_t rich_from = to_256(place.ground - kEnrichedDepth);
-        runs_.replace(low, std::min(high, rich_from), tail_of(filling.primary, flow));
-        runs_.replace(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
+        overlays_.add(low, std::min(high, rich_from), tail_of(filling.primary, flow));
+        overlays_.add(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
     }
 }
 
-/// What lies on the ground: where it begins, in 1/256 voxel, and its palette id.
+/// What lies on the ground: where it begins, in 1/256 voxel.
 struct ColumnMaker::Cover {
-    std::int32_t soil_from = 0;  ///< or sand
+    std::int32_t soil_from = 0;  ///< or sand; the column's top: there is none
     std::int32_t snow_from = 0;
-    std::uint16_t soil = LandscapePalette::kNoEntry;  ///< kNoEntry: there is none
-    std::uint16_t snow = LandscapePalette::kNoEntry;
+    std::uint16_t soil = 0;
 };
 
 /// Tops and covers of the columns of a row, side by side so that it goes by vectors.
@@ -239,35 +207,39 @@ void ColumnMaker::begin_row(std::int32_t z) {
 }
 
 ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
-    const LandscapePalette& palette = sources_.constants.palette;
-    const auto i = static_cast<std::size_t>(place.column);
-    Cover cover;
-    if (row_.soil256[i] > 0) {
+    Cover cover{.soil_from = place.top256, .snow_from = place.top256};
+    if (sources_.constants.has_relief) {
+        const LandscapePalette& palette = sources_.constants.palette;
+        const auto i = static_cast<std::size_t>(place.column);
         cover.soil = row_.is_sand[i] != 0 ? palette.sand : palette.soil;
-        cover.soil_from = std::max(0, place.top256 - row_.soil256[i]);
-    }
-    if (sources_.constants.has_snow && row_.snow256[i] > 0) {
-        cover.snow = palette.snow;
-        cover.snow_from = std::max(0, place.top256 - row_.snow256[i]);
+        if (cover.soil != LandscapePalette::kNoEntry) {
+            cover.soil_from = std::max(0, place.top256 - row_.soil256[i]);
+        }
+        if (palette.snow != LandscapePalette::kNoEntry) {
+            cover.snow_from = std::max(0, place.top256 - row_.snow256[i]);
+        }
     }
     return cover;
 }
 
-void ColumnMaker::add_cover(const Place& place) {
-    const Cover cover = cover_of(place);
-    const LimitTail flow = runs_.last().tail & ~LimitTail{0xffff};
-    if (cover.soil != LandscapePalette::kNoEntry) {
-        runs_.replace(cover.soil_from, place.top256, flow | cover.soil);
+/// The packed flow of the layer at the ground, which is `first` or higher.
+std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const {
+    const Block& block = blocks_[block_count_ - 1];
+    const std::size_t plane = sources_.region.plane_size();
+    const std::int32_t* const y256 = sources_.region.y256.data() + place.at;
+    const std::size_t layers = sources_.region.layers_built;
+    for (std::size_t k = first; k < layers; ++k) {
+        if (y256[k * plane] + block.moved >= block.top) {
+            return place.flow_of(k);
+        }
     }
-    if (cover.snow != LandscapePalette::kNoEntry) {
-        runs_.replace(cover.snow_from, place.top256, flow | cover.snow);
-    }
+    return place.flow_of(layers - 1);
 }
 
-void ColumnMaker::add_caves(const Place& place) {
+std::int32_t ColumnMaker::find_caves(const Place& place) {
     const auto found = sources_.caves.gaps(place.at);
     if (found.empty()) {
-        return;
+        return place.top256;
     }
     std::array<CaveGap, kCavesPerColumnMax> gaps;
     std::size_t count = 0;
@@ -300,37 +272,115 @@ void ColumnMaker::add_caves(const Place& place) {
         }
         const std::int32_t floor = to_256(gap.floor);
         const std::int32_t lid = gap.lid >= place.ground ? place.top256 : to_256(gap.lid);
-        runs_.replace(floor, lid, tail_of(constants.palette.cave_air, 0));
-        if (constants.palette.water != LandscapePalette::kNoEntry && flooded > gap.floor) {
-            runs_.replace(floor, std::min(lid, to_256(flooded)), tail_of(constants.palette.water, 0));
-        }
+        const bool has_water = constants.palette.water != LandscapePalette::kNoEntry;
+        const std::int32_t wet_to =
+            has_water && flooded > gap.floor ? std::min(lid, to_256(flooded)) : floor;
+        overlays_.add(floor, wet_to, tail_of(constants.palette.water, 0));
+        overlays_.add(std::max(floor, wet_to), lid, tail_of(constants.palette.cave_air, 0));
     }
     // What is open to the sky is no cave.
-    if (palette_id_of(runs_.last().tail) == constants.palette.cave_air) {
-        runs_.cut(runs_.last().bottom);
+    if (!overlays_.is_empty()) {
+        const Overlay& last = overlays_.all().back();
+        if (last.high == place.top256 && palette_id_of(last.tail) == constants.palette.cave_air) {
+            const std::int32_t top = last.low;
+            overlays_.cut(top);
+            return top;
+        }
     }
+    return place.top256;
 }
 
-void ColumnMaker::add_overhang(const Place& place) {
+std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
+                                     std::int32_t end) const {
+    const auto plane = static_cast<std::ptrdiff_t>(sources_.region.plane_size());
+    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
+    const auto layers = static_cast<std::int32_t>(sources_.region.layers_built);
+    const LayerRules* const rules = sources_.rules.data();
+    static constexpr std::int32_t kNoFlow = 0;
+    const std::int32_t* const flow = place.flow == nullptr ? &kNoFlow : place.flow;
+    const std::ptrdiff_t flow_plane = place.flow == nullptr ? 0 : place.flow_plane;
+    std::int32_t k = 0;
+    while (k < layers && *y256 + block.moved <= block.bottom) {
+        ++k;
+        y256 += plane;
+    }
+    std::int32_t bottom = block.bottom;
+    LimitTail below = 0;
+    bool below_alone = true;
+    Limit* to = nullptr;  // not null: what is right below was written as it is
+    std::int32_t clear_to = 0;
+    for (; k < layers && bottom < end; ++k, y256 += plane) {
+        const std::int32_t top = *y256 + block.moved;
+        if (top <= bottom) {
+            continue;
+        }
+        const LayerRules& rule = rules[k];
+        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), flow[k * flow_plane]);
+        const std::int32_t blend = below_alone || rule.alone || rule.blend <= 0
+                                       ? 0
+                                       : std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
+        const std::int32_t own_end = std::min(top, end);
+        const std::int32_t middle = bottom + blend;
+        if (to != nullptr && own_end <= clear_to) {
+            put_limit(to, middle, tail);
+            to += blend == 0 || middle < own_end ? 1 : 0;
+            put_limit(to++, own_end, tail);
+        } else {
+            if (to != nullptr) {
+                out.set_position(to, bottom, below);
+            }
+            out.write({.bottom = bottom,
+                       .top = own_end,
+                       .middle = std::min(middle, own_end),
+                       .tail = tail,
+                       .from = below});
+            clear_to = out.clear_to();
+            to = out.top() == own_end && out.shown() == tail ? out.position() : nullptr;
+        }
+        bottom = own_end;
+        below = tail;
+        below_alone = rule.alone;
+    }
+    if (to != nullptr) {
+        out.set_position(to, bottom, below);
+    }
+    if (bottom < end) {  // the stack ends below the ground
+        const std::uint16_t soil = sources_.constants.palette.soil;
+        const auto last = static_cast<std::uint16_t>(layers - 1);
+        out.write({.bottom = bottom,
+                   .top = end,
+                   .middle = bottom,
+                   .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
+                                   place.flow_of(last)),
+                   .from = 0});
+    }
+    return static_cast<std::size_t>(std::max(k, 1) - 1);
+}
+
+void ColumnMaker::write_overhang(LimitWriter& out, const Place& place) const {
     const Overhang* const overhang = sources_.overhangs.at(place.at);
     if (overhang == nullptr || place.water > kNoWater) {
         return;
     }
     const auto layer = static_cast<std::uint16_t>(overhang->layer);
     const LimitTail rock = tail_of(layer, place.flow_of(static_cast<std::size_t>(overhang->layer)));
-    const std::int32_t ground = runs_.top();
+    const std::int32_t ground = out.top();
     const std::int32_t top = to_256(overhang->top);
     const bool is_filled = overhang->bottom <= place.ground;
     const std::int32_t bottom = is_filled ? ground : to_256(overhang->bottom);
     if (top <= ground || bottom < ground) {
         return;
     }
-    runs_.push({.bottom = ground,
-              .top = bottom,
-              .middle = ground,
-              .tail = tail_of(sources_.constants.palette.open_air, 0),
-              .from = 0});
-    runs_.push({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+    if (bottom > ground) {
+        out.write({.bottom = ground,
+                   .top = bottom,
+                   .middle = ground,
+                   .tail = tail_of(sources_.constants.palette.open_air, 0),
+                   .from = 0});
+    }
+    if (top > bottom) {
+        out.write({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+    }
 }
 
 ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool has_flow) const {
@@ -351,126 +401,6 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
     return place;
 }
 
-void ColumnMaker::make(const Place& place) {
-    runs_.clear();
-    add_blocks(place);
-    add_sheets(place);
-    if (sources_.constants.has_relief) {
-        add_cover(place);
-    }
-    add_caves(place);
-    const std::uint16_t water = sources_.constants.palette.water;
-    if (place.water > kNoWater && water != LandscapePalette::kNoEntry) {
-        const std::int32_t bed = runs_.top();
-        runs_.push({.bottom = bed,
-                    .top = to_256(place.water),
-                    .middle = bed,
-                    .tail = tail_of(water, 0),
-                    .from = 0});
-    }
-    add_overhang(place);
-}
-
-/// Whether nothing but layers, cover and open water is there, and no fracture parts it.
-bool ColumnMaker::is_plain(const Place& place) const {
-    if (!sources_.constants.has_relief || sources_.region.gap_mask[place.at] != 0 ||
-        !sources_.caves.gaps(place.at).empty() || sources_.overhangs.at(place.at) != nullptr) {
-        return false;
-    }
-    const bool has_sheets = !sources_.constants.palette.fillings.empty();
-    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
-        const float half_sheet = has_sheets ? plane.half_sheet + 1.0F : 0.0F;
-        if (plane.y > -half_sheet && plane.y < std::max(place.ground, 2.0F) + half_sheet) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/// The limits of a plain column, as `make` and ColumnRuns::write would find them; nothing if the
-/// stack ends below the ground.
-Limit* ColumnMaker::write_plain(Limit* out, const Place& place) const {
-    const Cover cover = cover_of(place);
-    const bool has_soil = cover.soil != LandscapePalette::kNoEntry;
-    const bool has_snow = cover.snow != LandscapePalette::kNoEntry;
-    std::int32_t rock_top = place.top256;
-    rock_top = has_soil ? std::min(rock_top, cover.soil_from) : rock_top;
-    rock_top = has_snow ? std::min(rock_top, cover.snow_from) : rock_top;
-    float moved = sources_.folds[place.field_at];
-    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
-        moved += plane.y <= 0 ? -plane.half_throw : plane.half_throw;
-    }
-    const std::int32_t moved256 = to_256(moved);
-    const auto plane = static_cast<std::ptrdiff_t>(sources_.region.plane_size());
-    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
-    const std::int32_t* flow = place.flow;
-    const auto layers = static_cast<std::int32_t>(sources_.region.layers_built);
-    std::int32_t k = 0;
-    while (k < layers && y256[k * plane] + moved256 <= 0) {
-        ++k;
-    }
-    std::int32_t bottom = 0;
-    bool below_alone = true;
-    std::int32_t highest = k;  // the layer at the ground
-    for (; k < layers && bottom < rock_top; ++k) {
-        const std::int32_t top = y256[k * plane] + moved256;
-        if (top <= bottom) {
-            continue;
-        }
-        const LayerRules& rule = sources_.rules[static_cast<std::size_t>(k)];
-        const LimitTail tail =
-            tail_of(static_cast<std::uint16_t>(k), flow == nullptr ? 0 : flow[k * place.flow_plane]);
-        const std::int32_t end = std::min(top, rock_top);
-        if (below_alone || rule.alone || rule.blend <= 0) {
-            put_limit(out++, bottom, tail);
-        } else {
-            const std::int32_t blend = std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
-            if (bottom + blend < end) {
-                put_limit(out++, bottom + blend, tail);
-            }
-        }
-        put_limit(out++, end, tail);
-        bottom = end;
-        below_alone = rule.alone;
-        highest = k;
-    }
-    if (bottom < rock_top) {
-        return nullptr;
-    }
-    // What is below the cover may be higher layers that it hides.
-    for (std::int32_t top = k > 0 ? y256[(k - 1) * plane] + moved256 : 0; top < place.top256; ++k) {
-        if (k == layers) {
-            return nullptr;
-        }
-        if (const std::int32_t next = y256[k * plane] + moved256; next > top) {
-            top = next;
-            highest = k;
-        }
-    }
-    const LimitTail cover_flow =
-        flow == nullptr ? 0 : tail_of(0, flow[highest * place.flow_plane]);
-    const auto lay = [&](std::int32_t from, std::int32_t to, LimitTail tail) {
-        if (to > from) {
-            put_limit(out++, from, tail);
-            put_limit(out++, to, tail);
-        }
-    };
-    if (has_soil) {
-        lay(cover.soil_from, has_snow ? cover.snow_from : place.top256, cover_flow | cover.soil);
-    }
-    if (has_snow) {
-        lay(cover.snow_from, place.top256, cover_flow | cover.snow);
-    }
-    std::int32_t top = place.top256;
-    if (place.water > kNoWater && sources_.constants.palette.water != LandscapePalette::kNoEntry) {
-        const std::int32_t level = to_256(place.water);
-        lay(top, level, sources_.constants.palette.water);
-        top = std::max(top, level);
-    }
-    put_limit(out++, top, sources_.world.void_id());
-    return out;
-}
-
 void ColumnMaker::mark_elements(std::span<const Limit> limits) {
     for (const Limit& limit : limits) {
         const std::size_t id = limit.palette_id;
@@ -482,24 +412,53 @@ void ColumnMaker::mark_elements(std::span<const Limit> limits) {
 
 std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
                                bool has_flow) {
-    const auto grow = [&limits](std::size_t most) {
-        if (limits.size() < most) {
-            limits.resize(std::max(most, 2 * limits.size()));
+    const Place place = place_at(x, z, has_flow);
+    find_blocks(place);
+    overlays_.clear();
+    const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
+    for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
+        find_lenses(place, blocks_[b]);
+    }
+    find_sheets(place);
+    const Cover cover = cover_of(place);
+    const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
+    // The cover flows as what it lies on.
+    const bool on_overlay =
+        !overlays_.is_empty() && overlays_.all().back().high == place.top256;
+    LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
+    overlays_.cut(rock_top);
+    const std::int32_t end = find_caves(place);
+    const std::size_t most = used + LimitWriter::limits_max(
+                                        block_count_ * (sources_.region.layers_built + 1) + 5,
+                                        overlays_.size());
+    if (limits.size() < most) {
+        limits.resize(std::max(most, 2 * limits.size()));
+    }
+    LimitWriter out(limits.data() + used, overlays_.all());
+    std::size_t layer = 0;  // the last of the last block
+    for (std::size_t b = 0; b < block_count_; ++b) {
+        const std::int32_t block_end = std::min({blocks_[b].top, rock_top, end});
+        layer = blocks_[b].bottom < block_end ? write_block(out, place, blocks_[b], block_end) : 0;
+    }
+    if (rock_top < place.top256 && !on_overlay) {
+        cover_flow = tail_of(0, top_flow(place, layer));
+    }
+    const auto lay = [&](std::int32_t from, std::int32_t to, LimitTail tail) {
+        if (from < to) {
+            out.write({.bottom = from, .top = to, .middle = from, .tail = tail, .from = 0});
         }
     };
-    const Place place = place_at(x, z, has_flow);
-    if (is_plain(place)) {
-        grow(used + 2 * sources_.rules.size() + 8);
-        if (const Limit* const end = write_plain(limits.data() + used, place); end != nullptr) {
-            return static_cast<std::size_t>(end - limits.data());
-        }
+    const LandscapePalette& palette = sources_.constants.palette;
+    lay(cover.soil_from, std::min(cover.snow_from, end), cover_flow | cover.soil);
+    lay(cover.snow_from, end, cover_flow | palette.snow);
+    if (place.water > kNoWater && palette.water != LandscapePalette::kNoEntry) {
+        lay(out.top(), to_256(place.water), palette.water);
     }
-    make(place);
-    grow(used + runs_.limits_max());
-    const Limit* const end = runs_.write(limits.data() + used, sources_.world.void_id());
-    const auto now = static_cast<std::size_t>(end - limits.data());
+    write_overhang(out, place);
+    const Limit* const last = out.end(sources_.world.void_id());
+    const auto now = static_cast<std::size_t>(last - limits.data());
     // Only columns that lenses meet can show one.
-    if (sources_.region.gap_mask[place.at] != 0) {
+    if (has_lenses) {
         mark_elements(std::span(limits).subspan(used, now - used));
     }
     return now;

@@ -2,11 +2,11 @@
 //
 // Blocks between fracture planes, each with its layers and lenses; the fillings of fractures; soil,
 // sand and snow; caves and what floods them; open water; an overhang. What comes later replaces
-// what was there, see column_runs.h. Most columns have but layers in one block, a cover and perhaps
-// open water: their limits are written as they are found, and are the same.
+// what was there. Lenses, fillings and caves are looked for first, as overlays; then limits are
+// written as layers are met, see column_limits.h.
 #pragma once
 
-#include "generator/landscape/column_runs.h"
+#include "generator/landscape/column_limits.h"
 #include "generator/landscape/landscape.h"
 
 #include <array>
@@ -53,24 +53,35 @@ class ColumnMaker {
   private:
     struct Place;
     struct Cover;
+    struct Block;
+
 
     Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
-    bool is_plain(const Place& place) const;
-    Limit* write_plain(Limit* out, const Place& place) const;
-    void make(const Place& place);
-    void mark_elements(std::span<const Limit> limits);
-    void add_blocks(const Place& place);
-    void add_layers(const Place& place, std::int32_t moved256, std::int32_t block_top);
-    void add_lenses(const Place& place, std::int32_t moved256, std::int32_t block_bottom);
-    void add_sheets(const Place& place);
+    void find_blocks(const Place& place);
+    void find_lenses(const Place& place, const Block& block);
+    void find_sheets(const Place& place);
     Cover cover_of(const Place& place) const;
-    void add_cover(const Place& place);
-    void add_caves(const Place& place);
-    void add_overhang(const Place& place);
+    /// Returns where the column ends: a cave that is open to the sky is none.
+    std::int32_t find_caves(const Place& place);
+    std::int32_t top_flow(const Place& place, std::size_t first) const;
+    /// Up to `end`; returns the layer there.
+    std::size_t write_block(LimitWriter& out, const Place& place, const Block& block,
+                            std::int32_t end) const;
+    void write_overhang(LimitWriter& out, const Place& place) const;
+    void mark_elements(std::span<const Limit> limits);
 
     ColumnSources sources_;
     std::span<std::uint16_t> element_ids_;
-    ColumnRuns runs_;
+
+    /// Of one column: rock between two planes, moved as a whole; heights in 1/256 voxel.
+    struct Block {
+        std::int32_t bottom = 0;
+        std::int32_t top = 0;
+        std::int32_t moved = 0;
+    };
+    std::array<Block, kPlanesPerColumnMax + 1> blocks_{};
+    std::size_t block_count_ = 0;
+    Overlays overlays_;
 
     /// Of a row of the region's shape; heights and thicknesses in 1/256 voxel.
     struct Row {
