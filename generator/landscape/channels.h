@@ -44,11 +44,12 @@ struct ChannelRasters {
     std::vector<float> near_count;  ///< channels nearer than 1.5 of their half widths
     std::vector<float> weight;      ///< of the levels that `water` is made of
     std::vector<NearReach> near;    ///< scratch: reach by reach
+    bool is_wet = false;            ///< water stands somewhere
 };
 
 /// Cuts the channels into `ground` and says where water stands; the sea is part of it.
 void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,
                   const ReliefRasters& relief, const RiverGraph& rivers,
-                  const RectangleShape& shape);
+                  const RectangleShape& shape, const RowKernels& kernels);
 
 }  // namespace terrane

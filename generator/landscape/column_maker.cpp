@@ -309,6 +309,8 @@ std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const
     bool below_alone = true;
     Limit* to = nullptr;  // not null: what is right below was written as it is
     std::int32_t clear_to = 0;
+    const bool is_regular = sources_.region.irregular[place.at] == 0;
+    const std::int32_t* const middle256 = sources_.region.middle.data() + place.at;
     for (; k < layers && bottom < end; ++k, y256 += plane) {
         const std::int32_t top = *y256 + block.moved;
         if (top <= bottom) {
@@ -340,6 +342,21 @@ std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const
         bottom = own_end;
         below = tail;
         below_alone = rule.alone;
+        if (is_regular && to != nullptr) {
+            // Whole layers that all stand and blend as they were laid down.
+            const std::int32_t most = std::min(end, clear_to);
+            const std::int32_t* next = y256 + plane;
+            for (; k + 1 < layers && *next + block.moved <= most; next += plane) {
+                ++k;
+                y256 = next;
+                below = tail_of(static_cast<std::uint16_t>(k), flow[k * flow_plane]);
+                bottom = *next + block.moved;
+                put_limit(to, middle256[k * plane] + block.moved, below);
+                put_limit(to + 1, bottom, below);
+                to += 2;
+            }
+            below_alone = rules[k].alone;
+        }
     }
     if (to != nullptr) {
         out.set_position(to, bottom, below);

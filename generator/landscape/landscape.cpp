@@ -152,7 +152,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
         if (k == region.layers_built) {
             build_layer(region, constants, kernels);
         }
-        if (!walk.pass(constants_.resistance.layers[k], layers, k)) {
+        if (!walk.pass(constants_.resistance.layers[k], layers, k, kernels)) {
             break;
         }
     }
@@ -175,25 +175,25 @@ void Landscape::raise_banks(const Region& region) {
     constexpr float kBankUnder = 0.7F;
     const RectangleShape& shape = region.shape;
     banks_ = ground_;
-    if (shape.step != 1) {
+    if (shape.step != 1 || !channels_.is_wet) {
         return;
     }
-    const std::int32_t stride = shape.stride();
-    for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
-        for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * stride + x);
-            if (channels_.water[i] > kNoWater) {
-                continue;
-            }
-            float highest = kNoWater;
-            for (std::int32_t dz = -1; dz <= 1; ++dz) {
-                for (std::int32_t dx = -1; dx <= 1; ++dx) {
-                    highest = std::max(
-                        highest,
-                        channels_.water[static_cast<std::size_t>((z + dz) * stride + x + dx)]);
-                }
-            }
-            banks_[i] = std::max(banks_[i], highest - kBankUnder);
+    const auto stride = static_cast<std::size_t>(shape.stride());
+    const auto width = static_cast<std::size_t>(shape.width);
+    const auto higher = [](float a, float b) { return a < b ? b : a; };
+    std::array<float, kRectangleSideMax> highest;  // water of a column and the rows beside it
+    for (std::size_t z = 1; z + 1 < static_cast<std::size_t>(shape.length); ++z) {
+        const float* __restrict const water = channels_.water.data() + z * stride;
+        const float* __restrict const before = water - stride;
+        const float* __restrict const after = water + stride;
+        for (std::size_t x = 0; x < width; ++x) {
+            highest[x] = higher(water[x], higher(before[x], after[x]));
+        }
+        float* __restrict const banks = banks_.data() + z * stride;
+        for (std::size_t x = 1; x + 1 < width; ++x) {
+            const float near = higher(highest[x], higher(highest[x - 1], highest[x + 1]));
+            const float bank = water[x] > kNoWater ? kNoWater : near - kBankUnder;
+            banks[x] = higher(banks[x], bank);
         }
     }
 }
@@ -210,25 +210,32 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
     shows[0] = true;
     shown_.assign(plane, INT32_MIN);
     buried_.assign(plane, INT32_MAX);
+    const bool has_planes = !fractures_.is_empty();
     for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
-        for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-            const std::size_t at = field_index(shape, x, z);
-            // The most that any block of the column was lowered and lifted by.
-            float lowered = folds_[at];
-            float lifted = folds_[at];
-            for (const PlaneInColumn& one : fractures_.planes(at)) {
-                lowered -= one.half_throw;
-                lifted += one.half_throw;
-            }
-            shown_[i] = static_cast<std::int32_t>(
-                std::ceil((std::max(banks_[i], 2.0F) - lowered + kSlack) * kUnitsPerVoxel));
-            buried_[i] = static_cast<std::int32_t>(std::floor((-lifted - kSlack) * kUnitsPerVoxel));
-            if (const Overhang* const overhang = overhangs_.at(i); overhang != nullptr) {
-                shows[static_cast<std::size_t>(overhang->layer)] = true;
+        const auto first = static_cast<std::size_t>(z * shape.stride());
+        const std::size_t at = field_index(shape, 0, z);
+        // The most that any block of a column was lowered and lifted by.
+        std::array<float, kRectangleSideMax> lowered;
+        std::array<float, kRectangleSideMax> lifted;
+        const auto width = static_cast<std::size_t>(shape.width);
+        std::copy_n(folds_.data() + at, width, lowered.data());
+        std::copy_n(folds_.data() + at, width, lifted.data());
+        for (std::size_t x = 1; has_planes && x + 1 < width; ++x) {
+            for (const PlaneInColumn& one : fractures_.planes(at + x)) {
+                lowered[x] -= one.half_throw;
+                lifted[x] += one.half_throw;
             }
         }
+        const float* __restrict const banks = banks_.data() + first;
+        std::int32_t* __restrict const shown = shown_.data() + first;
+        std::int32_t* __restrict const buried = buried_.data() + first;
+        for (std::size_t x = 1; x + 1 < width; ++x) {
+            const float top = std::max(banks[x], 2.0F) - lowered[x] + kSlack;
+            shown[x] = static_cast<std::int32_t>(top * kUnitsPerVoxel) + 1;
+            buried[x] = static_cast<std::int32_t>((-lifted[x] - kSlack) * kUnitsPerVoxel) - 1;
+        }
     }
+    overhangs_.for_each([&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
     const auto any_below = [plane](const std::int32_t* low, const std::int32_t* high) {
         std::int32_t found = 0;
         for (std::size_t i = 0; i < plane; ++i) {
@@ -242,6 +249,9 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
         }
         if (k == region.layers_built) {
             build_layer(region, constants, kernels);
+        }
+        if (k > 0) {
+            build_blends(region, constants, k, kernels);
         }
         shows[k] = shows[k] || any_below(buried_.data(), region.y256.data() + k * plane);
     }
@@ -289,7 +299,7 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
         }
     }
     cut_channels(ground_.data(), channels_, constants_.channels, relief_, relief_builder_.rivers(),
-                 shape);
+                 shape, kernels);
     raise_banks(region);
     if (shape.step == 1 && constants_.caves.cell > 0) {
         caves_.build(constants_.caves, cave_graph_, banks_.data(), shape, kernels, noise_);

@@ -60,6 +60,15 @@ class OverhangField {
         return overhangs_.empty() || overhangs_[i].layer < 0 ? nullptr : &overhangs_[i];
     }
 
+    template <typename Use>
+    void for_each(Use use) const {
+        for (const Overhang& one : overhangs_) {
+            if (one.layer >= 0) {
+                use(one);
+            }
+        }
+    }
+
   private:
     bool find_ledges(const OverhangConstants& constants, const ResistanceConstants& resistance,
                      const OverhangInput& input, Region& region, const TerrainConstants& terrain,

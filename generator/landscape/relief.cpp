@@ -228,15 +228,9 @@ void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, c
                               .z_min = static_cast<float>(z_min - first.z) - slack,
                               .z_max = static_cast<float>(z_max - first.z) + slack},
                              [&](const Reach& one) {
-                                 ReachShape& shape = near_.emplace_back();
+                                 ReachShape& shape = near_.emplace_back(shape_of_reach(one));
                                  shape.x = static_cast<float>(one.x - origin_x);
                                  shape.z = static_cast<float>(one.z - origin_z);
-                                 std::copy(one.px.begin(), one.px.end(), shape.px);
-                                 std::copy(one.pz.begin(), one.pz.end(), shape.pz);
-                                 std::copy(one.inverse_square.begin(), one.inverse_square.end(),
-                                           shape.inverse_square);
-                                 shape.level = one.level;
-                                 shape.level_change = one.level_change;
                              });
     kernels.valleys(places, near_.data(), static_cast<std::int32_t>(near_.size()),
                     {.inverse_reach_square = 1.0F / (reach * reach),

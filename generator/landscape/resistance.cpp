@@ -33,30 +33,11 @@ ResistanceWalk::ResistanceWalk(float* height, float* rest, const float* over, st
     std::copy_n(over, count, rest);
 }
 
-bool ResistanceWalk::pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k) {
-    const float* __restrict const top = layers.first + k * layers.plane;
-    const float* __restrict const bottom = k > 0 ? top - layers.plane : nullptr;
-    float* __restrict const height = height_;
-    float* __restrict const rest = rest_;
-    const auto climb = [&](std::size_t i, float thickness) {
-        const float limit = thickness * layer.cost;
-        const float m = std::max(0.0F, std::min(rest[i], limit));
-        height[i] += m * m * (1.0F + layer.concave) / (m + layer.concave * limit + 1e-9F) *
-                     layer.inverse_cost;
-        rest[i] -= limit;
-        return static_cast<std::int32_t>(rest[i] > 0);
-    };
-    std::int32_t is_left = 0;
-    if (bottom == nullptr) {
-        for (std::size_t i = 0; i < count_; ++i) {
-            is_left |= climb(i, top[i]);
-        }
-    } else {
-        for (std::size_t i = 0; i < count_; ++i) {
-            is_left |= climb(i, top[i] - bottom[i]);
-        }
-    }
-    return is_left != 0;
+bool ResistanceWalk::pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k,
+                          const RowKernels& kernels) {
+    const float* const top = layers.first + k * layers.plane;
+    return kernels.resist(height_, rest_, k > 0 ? top - layers.plane : nullptr, top, layer,
+                          static_cast<std::int32_t>(count_));
 }
 
 }  // namespace terrane

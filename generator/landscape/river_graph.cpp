@@ -190,23 +190,14 @@ std::int64_t RiverConstants::cell_of(std::int64_t x, std::int64_t j) const {
     return floor_div(x - ((j & 1) != 0 ? cell_x / 2 : 0), cell_x);
 }
 
-OnReach nearest_on(const Reach& reach, float x, float z) {
-    OnReach best{.square = 1e30F};
-    for (std::size_t p = 0; p < kReachSegments; ++p) {
-        const float ax = x - reach.px[p];
-        const float az = z - reach.pz[p];
-        const float ex = reach.px[p + 1] - reach.px[p];
-        const float ez = reach.pz[p + 1] - reach.pz[p];
-        const float t = clamp01((ax * ex + az * ez) * reach.inverse_square[p]);
-        const float qx = ax - t * ex;
-        const float qz = az - t * ez;
-        const float square = qx * qx + qz * qz;
-        if (square < best.square) {
-            best = {.square = square,
-                    .along = (static_cast<float>(p) + t) / static_cast<float>(kReachSegments)};
-        }
-    }
-    return best;
+ReachShape shape_of_reach(const Reach& reach) {
+    ReachShape shape;
+    std::copy(reach.px.begin(), reach.px.end(), shape.px);
+    std::copy(reach.pz.begin(), reach.pz.end(), shape.pz);
+    std::copy(reach.inverse_square.begin(), reach.inverse_square.end(), shape.inverse_square);
+    shape.level = reach.level;
+    shape.level_change = reach.level_change;
+    return shape;
 }
 
 void RiverGraph::build(const RiverConstants& constants, const CellRange& range) {

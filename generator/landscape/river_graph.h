@@ -73,13 +73,8 @@ struct Reach {
     bool is_sink = false;
 };
 
-/// The nearest point of a reach.
-struct OnReach {
-    float square = 0;  ///< of the distance, columns^2
-    float along = 0;   ///< 0 at the node, 1 at the end
-};
-
-OnReach nearest_on(const Reach& reach, float x, float z);
+/// What kernels see of a reach; the place of its node is left to the caller.
+ReachShape shape_of_reach(const Reach& reach);
 
 struct ReachBox {
     float x_min = 0;

@@ -111,9 +111,11 @@ void find_elements(Region& region, const World& world, PlotCache& plots, const R
     }
 }
 
-/// Raises S by an element that stands on layer heights `height`, and marks its columns.
-void lay_element(Region& region, const PlacedElement& placed, const float* height) {
+/// Marks the columns of an element that stands on layer heights `height`, and raises S by it unless
+/// it `replaces` what is above.
+void lay_element(Region& region, const PlacedElement& placed, const float* height, bool replaces) {
     const std::uint64_t gap_bit = std::uint64_t{1} << static_cast<unsigned>(placed.element().gap);
+    const std::uint8_t mark = replaces ? 0 : 1;
     for (std::int32_t row = 0; row < placed.rows; ++row) {
         const auto first = static_cast<std::size_t>(
             (placed.row_first + row) * region.shape.stride() + placed.column_first);
@@ -123,8 +125,8 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
         for (std::size_t i = 0; i < static_cast<std::size_t>(placed.columns); ++i) {
             if (thickness[i] > 0) {
                 region.gap_mask[first + i] |= gap_bit;
-                region.irregular[first + i] = 1;
-                if (region.elements_lift) {
+                region.irregular[first + i] |= mark;
+                if (!replaces && region.elements_lift) {
                     region.stacked[first + i] =
                         std::max(region.stacked[first + i], height[first + i] + thickness[i]);
                 }
@@ -190,6 +192,14 @@ void build_flow(Region& region, const TerrainConstants& constants, std::size_t l
     }
 }
 
+void build_blends(Region& region, const TerrainConstants& constants, std::size_t layer,
+                  const RowKernels& kernels) {
+    const std::size_t plane = region.plane_size();
+    const std::int32_t* const y256 = region.y256.data() + layer * plane;
+    kernels.blends(region.middle.data() + layer * plane, region.irregular.data(), y256 - plane,
+                   y256, constants.rules[layer].blend_on_below, static_cast<std::int32_t>(plane));
+}
+
 void begin_region(Region& region, const World& world, const ColumnRectangle& rectangle,
                   std::int32_t apron, PlotCache& plots, const RowKernels& kernels) {
     TERRANE_ASSERT(rectangle.width >= 1 && rectangle.width <= kRectangleSideMax - 2 * apron &&
@@ -229,7 +239,7 @@ void build_layer(Region& region, const TerrainConstants& constants, const RowKer
     kernels.quantise(region.y256.data() + k * plane, heights, values);
     const std::size_t end = k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
     for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
-        lay_element(region, region.elements[e], heights);
+        lay_element(region, region.elements[e], heights, false);
     }
 }
 
@@ -257,7 +267,8 @@ void place_elements(Region& region, const World& world, const std::int32_t* show
     for (const PlacedElement& placed : region.elements) {
         lay_element(region, placed,
                     region.heights.data() +
-                        static_cast<std::size_t>(placed.element().gap) * plane);
+                        static_cast<std::size_t>(placed.element().gap) * plane,
+                    true);
     }
 }
 
@@ -270,10 +281,7 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
     for (std::size_t k = 0; k < layers; ++k) {
         build_layer(region, constants, kernels);
         if (k > 0) {
-            const std::int32_t* const y256 = region.y256.data() + k * plane;
-            kernels.blends(region.middle.data() + k * plane, region.irregular.data(), y256 - plane,
-                           y256, constants.rules[k].blend_on_below,
-                           static_cast<std::int32_t>(plane));
+            build_blends(region, constants, k, kernels);
         }
         build_flow(region, constants, k, kernels);
     }

@@ -60,7 +60,7 @@ struct Region {
     /// K planes: where each layer's blend into the one right below ends, in 1/256 voxel.
     std::vector<std::int32_t> middle;
     /// Per column of shape: not 0 where a layer pinches out, a blend reaches its layer's top, or an
-    /// element stands.
+    /// element stands that lifts.
     std::vector<std::uint8_t> irregular;
 
     NoiseBuffers noise_buffers;
@@ -100,8 +100,13 @@ void build_region(Region& region, const World& world, const TerrainConstants& co
 void begin_region(Region& region, const World& world, const ColumnRectangle& rectangle,
                   std::int32_t apron, PlotCache& plots, const RowKernels& kernels);
 
-/// Builds the layer above those that are there; needs no flow, and no blends.
+/// Builds the layer above those that are there, without flow and blends.
 void build_layer(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
+
+/// Fills one layer's plane of `region.middle` and marks irregular columns, once its heights are there;
+/// not for the lowest layer.
+void build_blends(Region& region, const TerrainConstants& constants, std::size_t layer,
+                  const RowKernels& kernels);
 
 /// Places elements that lift nothing, once the layers are there: those of gaps whose layer is built,
 /// as far as their layer's top lies below `shown256` in some column of shape.

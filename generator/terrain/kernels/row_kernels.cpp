@@ -465,6 +465,61 @@ void valleys(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count
     }
 }
 
+void near_reach(const ReachRow& row, const ReachShape& reach) {
+    for (std::int32_t first = 0; first < row.count; first += kBlock) {
+        const float* __restrict const wander_x = row.wander_x + first;
+        const float* __restrict const wander_z = row.wander_z + first;
+        float* __restrict const square = row.square + first;
+        float* __restrict const along = row.along + first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float x = (row.x + row.step * static_cast<float>(first + i)) + wander_x[i];
+            const float z = row.z + wander_z[i];
+            static_assert(kReachSegments == 4);
+            Nearest nearest = nearer({}, x, z, reach, 0);
+            nearest = nearer(nearest, x, z, reach, 1);
+            nearest = nearer(nearest, x, z, reach, 2);
+            nearest = nearer(nearest, x, z, reach, 3);
+            square[i] = nearest.square;
+            along[i] = nearest.along;
+        }
+    }
+}
+
+bool resist(float* __restrict height, float* __restrict rest, const float* bottom,
+            const float* __restrict top, const LayerResistance& layer, std::int32_t count) {
+    const float cost = layer.cost;
+    const float inverse_cost = layer.inverse_cost;
+    const float concave = layer.concave;
+    std::int32_t left[kBlock] = {};
+    for (std::int32_t first = 0; first < count; first += kBlock) {
+        float thickness[kBlock];
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            thickness[i] = top[first + i];
+        }
+        if (bottom != nullptr) {
+            for (std::int32_t i = 0; i < kBlock; ++i) {
+                thickness[i] = top[first + i] - bottom[first + i];
+            }
+        }
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float limit = thickness[i] * cost;
+            const float before = rest[first + i];
+            const float most = limit < before ? limit : before;
+            const float m = 0.0F < most ? most : 0.0F;
+            height[first + i] +=
+                m * m * (1.0F + concave) / (m + concave * limit + 1e-9F) * inverse_cost;
+            const float after = before - limit;
+            rest[first + i] = after;
+            left[i] |= after > 0.0F ? 1 : 0;
+        }
+    }
+    std::int32_t any = 0;
+    for (std::int32_t i = 0; i < kBlock; ++i) {
+        any |= left[i];
+    }
+    return any != 0;
+}
+
 void tube(const TubeRow& row, const TubePiece& piece) {
     constexpr float kFlatFloor = 0.62F;
     constexpr float kCeiling = 0.95F;
@@ -516,6 +571,8 @@ const RowKernels kKernels = {.gradients = gradients,
                              .element_tile = element_tile,
                              .erode = erode,
                              .valleys = valleys,
+                             .near_reach = near_reach,
+                             .resist = resist,
                              .tube = tube};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

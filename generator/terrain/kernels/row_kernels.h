@@ -134,6 +134,18 @@ struct ValleyConstants {
     float plateau = 0;
 };
 
+/// Columns side by side that look for a reach, moved by how rivers wind; whole blocks are written.
+struct ReachRow {
+    float* square = nullptr;  ///< of the distance to the reach, columns^2
+    float* along = nullptr;   ///< where on it, 0 at its node and 1 at its end
+    const float* wander_x = nullptr;
+    const float* wander_z = nullptr;
+    float x = 0;  ///< of the first column, whole columns from the reach's node
+    float z = 0;
+    float step = 1;
+    std::int32_t count = 0;
+};
+
 /// A straight piece of a cave's tube, see generator/landscape/caves.h; columns from the tube's
 /// origin, voxels.
 struct TubePiece {
@@ -160,6 +172,14 @@ struct TubeRow {
     float x = 0;  ///< of the first column, from the tube's origin
     float z = 0;
     std::int32_t count = 0;
+};
+
+/// What a layer does to slopes, see generator/landscape/resistance.h.
+struct LayerResistance {
+    float cost = 1;  ///< g: raw height of a voxel
+    float inverse_cost = 1;
+    float resistance = 1;  ///< rho
+    float concave = 0;     ///< e
 };
 
 struct RowKernels {
@@ -199,6 +219,12 @@ struct RowKernels {
     /// order.
     void (*valleys)(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count,
                     const ValleyConstants& constants);
+    /// How far a reach is from each column.
+    void (*near_reach)(const ReachRow& row, const ReachShape& reach);
+    /// Goes up through a layer of the resistance map, see generator/landscape/resistance.h, in
+    /// whole blocks: `bottom` is null for the lowest layer. Whether some value is left.
+    bool (*resist)(float* height, float* rest, const float* bottom, const float* top,
+                   const LayerResistance& layer, std::int32_t count);
     /// Lowers floors and raises lids to what a piece of a tube hollows out.
     void (*tube)(const TubeRow& row, const TubePiece& piece);
 };
