@@ -61,6 +61,21 @@ void dilate(std::vector<float>& highest, std::vector<float>& rows, std::vector<f
     dilate_by(highest, static_cast<std::size_t>(shape.stride()));
 }
 
+constexpr std::int32_t kReachMax = 6;  ///< columns: a world file asks for no more
+
+/// Distances to columns so far away along x and z.
+struct Distances {
+    float of[kReachMax + 1][kReachMax + 1];
+
+    Distances() {
+        for (std::int32_t z = 0; z <= kReachMax; ++z) {
+            for (std::int32_t x = 0; x <= kReachMax; ++x) {
+                of[z][x] = std::sqrt(static_cast<float>(x * x + z * z));
+            }
+        }
+    }
+};
+
 /// The nearest lip of a layer's top at `raw_top` around a column, as a share of what that lip
 /// reaches; 1 if there is none so near. Rows and columns from the middle outwards, as far as they
 /// can come nearer still: a lip never reaches farther than `farthest`.
@@ -72,13 +87,11 @@ struct LipSearch {
     std::ptrdiff_t stride;
     std::int32_t reach;
     float farthest;
+    Distances distances = {};
 
     float nearest(std::ptrdiff_t center, float raw_top) const {
         float e = 1;
-        for (std::int32_t dz = 0; dz <= reach; ++dz) {
-            if (static_cast<float>(dz) / farthest >= e) {
-                break;
-            }
+        for (std::int32_t dz = 0; dz <= reach && static_cast<float>(dz) < e * farthest; ++dz) {
             e = nearest_in_row(e, center, dz, raw_top);
             if (dz > 0) {
                 e = nearest_in_row(e, center, -dz, raw_top);
@@ -93,14 +106,12 @@ struct LipSearch {
         if (row_highest[row] < raw_top) {
             return e;
         }
-        for (std::int32_t dx = 0; dx <= reach; ++dx) {
-            const float distance = std::sqrt(static_cast<float>(dx * dx + dz * dz));
-            if (distance / farthest >= e) {
-                break;
-            }
+        const float* const distance = distances.of[dz < 0 ? -dz : dz];
+        for (std::int32_t dx = 0; dx <= reach && distance[dx] < e * farthest; ++dx) {
             for (const std::ptrdiff_t j : {row - dx, row + dx}) {
-                if (over[j] >= raw_top && std::abs(moved[j] - moved[center]) <= 0.4F * distance) {
-                    e = std::min(e, distance / reaches[j]);
+                if (over[j] >= raw_top &&
+                    std::abs(moved[j] - moved[center]) <= 0.4F * distance[dx]) {
+                    e = std::min(e, distance[dx] / reaches[j]);
                 }
             }
         }
@@ -241,6 +252,9 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
                 const float raw_top = raw_tops_[l * layers.plane + i];
                 const float* const top = layers.first + ledge * layers.plane + i;
                 const float thickness = *top - *(top - layers.plane);
+                if (*top + input.moved[center] <= ground[i] + kGapLeast) {
+                    continue;  // no lip of it would be high enough
+                }
                 const float e = lips.nearest(static_cast<std::ptrdiff_t>(center), raw_top);
                 const float lip = *top + input.moved[center] - 1.5F * e;
                 const float bottom = lip - (0.45F * thickness * (1.0F - e * e) + 1.2F);
