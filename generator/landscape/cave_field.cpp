@@ -129,20 +129,12 @@ void CaveField::build(const CaveConstants& constants, const CaveGraph& graph, co
         tube_floor_.assign(size, kSky);
         tube_lid_.assign(size, -kSky);
     };
-    for (const Tube& tube : graph.tubes()) {
-        const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
-        const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
-        if (columns.first < columns.end && rows.first < rows.end && tube.y_min < highest) {
-            make_ready();
-            add_tube(tube, ground, shape, kernels);
-        }
-    }
-    for (const Doline& doline : graph.dolines()) {
+    const auto add_doline = [&](const Doline& doline) {
         const float most = 1.45F * doline.radius + 1.0F;
         const Touched columns = touched(doline.x, -most, most, shape.x0, shape.width);
         const Touched rows = touched(doline.z, -most, most, shape.z0, shape.length);
         if (columns.first >= columns.end || rows.first >= rows.end || doline.y >= highest) {
-            continue;
+            return;
         }
         make_ready();
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
@@ -156,12 +148,27 @@ void CaveField::build(const CaveConstants& constants, const CaveGraph& graph, co
                 }
             }
         }
+    };
+    for (const CaveCell& cell : graph.cells()) {
+        for (const Tube& tube : cell.tubes) {
+            const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
+            const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
+            if (columns.first < columns.end && rows.first < rows.end && tube.y_min < highest) {
+                make_ready();
+                add_tube(tube, ground, shape, kernels);
+            }
+        }
+    }
+    for (const CaveCell& cell : graph.cells()) {
+        for (const Doline& doline : cell.dolines) {
+            add_doline(doline);
+        }
     }
 }
 
 void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
                  const RectangleShape& shape) {
-    for (const Doline& doline : graph.dolines()) {
+    const auto cut = [&](const Doline& doline) {
         const float most = doline.radius + kFunnel + 1.0F;
         const Touched columns = touched(doline.x, -most, most, shape.x0, shape.width);
         const Touched rows = touched(doline.z, -most, most, shape.z0, shape.length);
@@ -175,6 +182,9 @@ void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
                 ground[i] -= kFunnel * down * allowed[i];
             }
         }
+    };
+    for (const CaveCell& cell : graph.cells()) {
+        std::for_each(cell.dolines.begin(), cell.dolines.end(), cut);
     }
 }
 

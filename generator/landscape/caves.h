@@ -76,22 +76,28 @@ struct Doline {
     float radius = 0;
 };
 
+/// What begins in a cell.
+struct CaveCell {
+    std::vector<Tube> tubes;
+    std::vector<Doline> dolines;
+};
+
 /// Everything that can be met in a rectangle of columns, cells ascending. Kept from region to
-/// region: neighbours ask for the same cells.
+/// region: neighbours ask for the same cells, or for most of them.
 class CaveGraph {
   public:
     void build(const CaveConstants& constants, const FoldConstants& folds,
                const RectangleShape& shape);
 
-    const std::vector<Tube>& tubes() const { return tubes_; }
-
-    const std::vector<Doline>& dolines() const { return dolines_; }
+    std::span<const CaveCell> cells() const { return cells_; }
 
   private:
-    bool is_built_ = false;
-    std::array<std::int64_t, 4> range_{};
-    std::vector<Tube> tubes_;
-    std::vector<Doline> dolines_;
+    std::int64_t first_i_ = 0;
+    std::int64_t first_j_ = 0;
+    std::int64_t width_ = 0;
+    std::int64_t length_ = 0;
+    std::vector<CaveCell> cells_;
+    std::vector<CaveCell> before_;
 };
 
 /// Voxels from floor to lid in one column.

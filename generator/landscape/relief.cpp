@@ -12,6 +12,7 @@ namespace terrane {
 namespace {
 
 constexpr std::int64_t kSmoothSteps = 4;  ///< a valley is so many steps wide where it is smoothed
+constexpr std::size_t kTilesTogether = 2;
 constexpr std::size_t kValues = 6;  ///< of a lattice point: g, hr, pf, vm, and how it is moved
 
 /// So many lattice points each way are weighed together, as far as there are so many.
@@ -181,67 +182,84 @@ void ReliefBuilder::find_rivers(const RiverConstants& constants, const Rectangle
     rivers_.build(constants, {.first_i = i0, .last_i = i1, .first_j = j0, .last_j = j1});
 }
 
-void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                              const LatticeTile& tile, const RowKernels& kernels) {
+/// Up to kTilesTogether x kTilesTogether tiles: near reaches are looked for once for all of them.
+void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                               const LatticeTile& first, const RowKernels& kernels) {
     const RiverConstants& rivers = constants.rivers;
     const std::size_t stride = x.stride();
     const std::size_t plane = stride * z.lines.size() + kVectorPad;
     const float* const wander_x = lattice_.data() + 4 * plane;
     const float* const wander_z = wander_x + plane;
-    const std::int64_t origin_x = x.lines[tile.first_x];
-    const std::int64_t origin_z = z.lines[tile.first_z];
-    ValleyPlaces places;
-    std::array<MovedPlace, kVectorPad> moved_to;
-    std::array<std::size_t, kVectorPad> at;
+    const std::int64_t origin_x = x.lines[first.first_x];
+    const std::int64_t origin_z = z.lines[first.first_z];
+    struct Tile {
+        ValleyPlaces places;
+        std::array<MovedPlace, kVectorPad> moved_to;
+        std::array<std::size_t, kVectorPad> at;
+    };
+    std::array<Tile, kTilesTogether * kTilesTogether> tiles;
+    std::size_t tile_count = 0;
     std::int64_t x_min = INT64_MAX;
     std::int64_t x_max = INT64_MIN;
     std::int64_t z_min = INT64_MAX;
     std::int64_t z_max = INT64_MIN;
-    for (std::size_t n = 0; n < kVectorPad; ++n) {
-        // Beyond the tile's or the lattice's end, the last points once more.
-        const std::size_t row = std::min(n / tile.width, tile.length - 1);
-        const std::size_t line_x = std::min(tile.first_x + n % tile.width, x.lines.size() - 1);
-        const std::size_t line_z = std::min(tile.first_z + row, z.lines.size() - 1);
-        at[n] = line_z * stride + line_x;
-        moved_to[n] =
-            moved(x.lines[line_x], z.lines[line_z], wander_x[at[n]], wander_z[at[n]]);
-        const MovedPlace& place = moved_to[n];
-        places.x[n] = static_cast<float>(place.x - origin_x);
-        places.z[n] = static_cast<float>(place.z - origin_z);
-        places.x_rest[n] = place.x_rest;
-        places.z_rest[n] = place.z_rest;
-        x_min = std::min(x_min, place.x);
-        x_max = std::max(x_max, place.x + 1);
-        z_min = std::min(z_min, place.z);
-        z_max = std::max(z_max, place.z + 1);
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+        const std::size_t tile_x = first.first_x + t % kTilesTogether * first.width;
+        const std::size_t tile_z = first.first_z + t / kTilesTogether * first.length;
+        if (tile_x >= x.lines.size() || tile_z >= z.lines.size()) {
+            continue;
+        }
+        Tile& tile = tiles[tile_count++];
+        for (std::size_t n = 0; n < kVectorPad; ++n) {
+            // Beyond the tile's or the lattice's end, the last points once more.
+            const std::size_t row = std::min(n / first.width, first.length - 1);
+            const std::size_t line_x = std::min(tile_x + n % first.width, x.lines.size() - 1);
+            const std::size_t line_z = std::min(tile_z + row, z.lines.size() - 1);
+            tile.at[n] = line_z * stride + line_x;
+            tile.moved_to[n] = moved(x.lines[line_x], z.lines[line_z], wander_x[tile.at[n]],
+                                     wander_z[tile.at[n]]);
+            const MovedPlace& place = tile.moved_to[n];
+            tile.places.x[n] = static_cast<float>(place.x - origin_x);
+            tile.places.z[n] = static_cast<float>(place.z - origin_z);
+            tile.places.x_rest[n] = place.x_rest;
+            tile.places.z_rest[n] = place.z_rest;
+            x_min = std::min(x_min, place.x);
+            x_max = std::max(x_max, place.x + 1);
+            z_min = std::min(z_min, place.z);
+            z_max = std::max(z_max, place.z + 1);
+        }
     }
     const float reach = 1.1F * constants.valley;
     const float slack = reach + 1.0F;  // far above rounding errors: what is left out weighs 0
-    const Reach& first = rivers_.reaches().front();
+    const Reach& reference = rivers_.reaches().front();
     near_.clear();
     rivers_.for_each_meeting({.first_i = rivers.cell_of(x_min, 1) - kRiverReachCells,
                               .last_i = rivers.cell_of(x_max, 0) + kRiverReachCells,
                               .first_j = rivers.row_of(z_min) - kRiverReachCells,
                               .last_j = rivers.row_of(z_max) + kRiverReachCells},
-                             {.x_min = static_cast<float>(x_min - first.x) - slack,
-                              .x_max = static_cast<float>(x_max - first.x) + slack,
-                              .z_min = static_cast<float>(z_min - first.z) - slack,
-                              .z_max = static_cast<float>(z_max - first.z) + slack},
+                             {.x_min = static_cast<float>(x_min - reference.x) - slack,
+                              .x_max = static_cast<float>(x_max - reference.x) + slack,
+                              .z_min = static_cast<float>(z_min - reference.z) - slack,
+                              .z_max = static_cast<float>(z_max - reference.z) + slack},
                              [&](const Reach& one) {
                                  ReachShape& shape = near_.emplace_back(shape_of_reach(one));
                                  shape.x = static_cast<float>(one.x - origin_x);
                                  shape.z = static_cast<float>(one.z - origin_z);
                              });
-    kernels.valleys(places, near_.data(), static_cast<std::int32_t>(near_.size()),
-                    {.inverse_reach_square = 1.0F / (reach * reach),
-                     .e2 = 0.0025F * constants.valley * constants.valley,
-                     .half_valley = 0.5F * constants.valley,
-                     .plateau = constants.plateau});
-    for (std::size_t n = 0; n < kVectorPad; ++n) {
-        float* const value = lattice_.data() + at[n];
-        value[plane] = places.weight[n] > 0 ? places.river[n]
-                                            : rivers.potential_at(moved_to[n].x, moved_to[n].z);
-        value[2 * plane] = places.crest[n];
+    for (std::size_t t = 0; t < tile_count; ++t) {
+        Tile& tile = tiles[t];
+        kernels.valleys(tile.places, near_.data(), static_cast<std::int32_t>(near_.size()),
+                        {.inverse_reach_square = 1.0F / (reach * reach),
+                         .e2 = 0.0025F * constants.valley * constants.valley,
+                         .half_valley = 0.5F * constants.valley,
+                         .plateau = constants.plateau});
+        for (std::size_t n = 0; n < kVectorPad; ++n) {
+            float* const value = lattice_.data() + tile.at[n];
+            value[plane] = tile.places.weight[n] > 0
+                               ? tile.places.river[n]
+                               : rivers.potential_at(tile.moved_to[n].x, tile.moved_to[n].z);
+            value[2 * plane] = tile.places.crest[n];
+        }
     }
 }
 
@@ -260,11 +278,11 @@ void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x
         *value *= constants.rivers.wander;
     }
     const TileSides sides = tile_sides(x.lines.size(), z.lines.size());
-    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += sides.z) {
-        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += sides.x) {
-            fill_tile(constants, x, z,
-                      {.first_x = line_x, .first_z = line_z, .width = sides.x, .length = sides.z},
-                      kernels);
+    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += kTilesTogether * sides.z) {
+        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += kTilesTogether * sides.x) {
+            fill_tiles(constants, x, z,
+                       {.first_x = line_x, .first_z = line_z, .width = sides.x, .length = sides.z},
+                       kernels);
         }
     }
     for (std::size_t line_z = 0; line_z < z.lines.size(); ++line_z) {

@@ -76,12 +76,12 @@ class ReliefBuilder {
     void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
     void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                       const RowKernels& kernels, NoiseBuffers& buffers);
-    void fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                   const LatticeTile& tile, const RowKernels& kernels);
+    void fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                    const LatticeTile& first, const RowKernels& kernels);
 
     RiverGraph rivers_;
     std::vector<float> lattice_;    ///< planes of g, hr, pf, vm and how a place is moved in x and z
-    std::vector<ReachShape> near_;  ///< of one tile of the lattice
+    std::vector<ReachShape> near_;  ///< of some tiles of the lattice
     std::vector<float> mixed_;      ///< one row of the lattice, mixed along z
 };
 

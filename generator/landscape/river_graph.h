@@ -93,7 +93,24 @@ struct CellRange {
     friend bool operator==(const CellRange&, const CellRange&) = default;
 };
 
-/// The reaches of a rectangle of cells. Kept from region to region: neighbours ask for the same.
+/// Where a cell's river passes.
+struct RiverNode {
+    std::uint64_t hash = 0;
+    std::int64_t x = 0;
+    std::int64_t z = 0;
+    float level = 0;
+    float accumulated = 1;
+    std::int8_t downstream = -1;  ///< which neighbour; -1: it is a sink
+};
+
+/// A rectangle of cells' nodes, by row.
+struct RiverNodes {
+    CellRange range;
+    std::vector<RiverNode> nodes;
+};
+
+/// The reaches of a rectangle of cells. Kept from region to region: neighbours ask for the same, or
+/// for most of the nodes.
 class RiverGraph {
   public:
     /// More are never held: a coarse region of the widest rectangle needs fewer.
@@ -130,6 +147,8 @@ class RiverGraph {
 
   private:
     CellRange range_;
+    RiverNodes nodes_;  ///< of the range and what is upstream and downstream of it
+    RiverNodes before_;
     std::vector<Reach> reaches_;
     std::vector<ReachBox> boxes_;
 };
