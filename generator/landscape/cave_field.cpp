@@ -70,12 +70,10 @@ void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleS
         const float most = 1.45F * std::max(piece.radius, piece.radius + piece.dr) + 1.0F;
         const float x_end = piece.x + piece.ex;
         const float z_end = piece.z + piece.ez;
-        const Touched own_columns =
-            touched(tube.x, std::min(piece.x, x_end) - most, std::max(piece.x, x_end) + most,
-                    shape.x0, shape.width);
-        const Touched own_rows =
-            touched(tube.z, std::min(piece.z, z_end) - most, std::max(piece.z, z_end) + most,
-                    shape.z0, shape.length);
+        const Touched own_columns = touched(tube.x, std::min(piece.x, x_end) - most,
+                                            std::max(piece.x, x_end) + most, shape.x0, shape.width);
+        const Touched own_rows = touched(tube.z, std::min(piece.z, z_end) - most,
+                                         std::max(piece.z, z_end) + most, shape.z0, shape.length);
         for (std::int32_t row = own_rows.first; row < own_rows.end; ++row) {
             const std::int32_t first = row * shape.stride() + own_columns.first;
             kernels.tube({.floor = tube_floor_.data() + first,

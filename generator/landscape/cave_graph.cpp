@@ -194,8 +194,9 @@ void CaveGraph::build(const CaveConstants& constants, const FoldConstants& folds
         for (std::int64_t i = i0; i <= i1; ++i) {
             CaveCell& cell = cells_[static_cast<std::size_t>((j - j0) * width + (i - i0))];
             if (i >= first_i_ && i < first_i_ + width_ && j >= first_j_ && j < first_j_ + length_) {
-                std::swap(cell, before_[static_cast<std::size_t>((j - first_j_) * width_ +
-                                                                 (i - first_i_))]);
+                std::swap(
+                    cell,
+                    before_[static_cast<std::size_t>((j - first_j_) * width_ + (i - first_i_))]);
             } else {
                 fill(cell, i, j);
             }

@@ -40,6 +40,7 @@ struct NearReach {
 /// Per column of a shape.
 struct ChannelRasters {
     std::vector<float> water;       ///< level, or kNoWater
+    std::vector<float> levels;      ///< where it would stand if arms of a river did not touch
     std::vector<float> nearness;    ///< distance to the nearest channel's middle in its half widths
     std::vector<float> near_count;  ///< channels nearer than 1.5 of their half widths
     std::vector<float> weight;      ///< of the levels that `water` is made of

@@ -64,8 +64,8 @@ struct Run {
 
 /// Writes one limit.
 inline void put_limit(Limit* to, std::int32_t y256, LimitTail tail) {
-    static_assert(sizeof(Limit) == sizeof y256 + sizeof tail &&
-                  offsetof(Limit, palette_id) == 4 && offsetof(Limit, flow) == 6);
+    static_assert(sizeof(Limit) == sizeof y256 + sizeof tail && offsetof(Limit, palette_id) == 4 &&
+                  offsetof(Limit, flow) == 6);
     std::memcpy(static_cast<void*>(to), &y256, sizeof y256);
     std::memcpy(&to->palette_id, &tail, sizeof tail);
 }
@@ -88,9 +88,7 @@ class LimitWriter {
     LimitTail shown() const { return shown_; }
 
     /// Up to here no overlay comes.
-    std::int32_t clear_to() const {
-        return overlays_.empty() ? INT32_MAX : overlays_.front().low;
-    }
+    std::int32_t clear_to() const { return overlays_.empty() ? INT32_MAX : overlays_.front().low; }
 
     /// For those who write limits themselves as far as it is clear: where they go, and where they
     /// went.

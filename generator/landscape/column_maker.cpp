@@ -9,11 +9,12 @@
 namespace terrane {
 namespace {
 
-constexpr float kRoofUnderWater = 5;    ///< voxels of rock left between a cave and open water
-constexpr float kRoofLeast = 1.6F;      ///< voxels: a thinner roof falls in
-constexpr float kWallLeast = 1.5F;      ///< voxels: nearer caves become one
-constexpr float kCaveLeast = 0.8F;      ///< voxels
-constexpr float kCaveDeepest = 2;       ///< voxels above the bottom of the world
+constexpr float kRoofUnderWater = 5;  ///< voxels of rock left between a cave and open water
+constexpr float kRoofLeast = 1.6F;    ///< voxels: a thinner roof falls in
+constexpr float kWallLeast = 1.5F;    ///< voxels: nearer caves become one
+constexpr float kCaveLeast = 0.8F;    ///< voxels
+constexpr float kSpillLeast = 0.5F;   ///< voxels: open water stands so much above ground beside it
+constexpr float kCaveDeepest = 2;     ///< voxels above the bottom of the world
 constexpr float kSteepestSoil = 0.42F;  ///< slope^2 on which no soil lies
 constexpr float kSteepestSnow = 1.1F;
 constexpr float kSnow = 2.2F;         ///< voxels
@@ -79,8 +80,7 @@ void ColumnMaker::find_blocks(const Place& place) {
         const std::int32_t top256 =
             b + 1 == count ? place.top256 : std::min(to_256(tops[b]), place.top256);
         if (top256 > bottom256) {
-            blocks_[block_count_++] = {
-                .bottom = bottom256, .top = top256, .moved = to_256(moved)};
+            blocks_[block_count_++] = {.bottom = bottom256, .top = top256, .moved = to_256(moved)};
             bottom256 = top256;
         }
         bottom = tops[b];
@@ -236,6 +236,36 @@ std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const 
     return place.flow_of(layers - 1);
 }
 
+/// Whether open water stands in a column or beside it.
+bool ColumnMaker::is_by_water(const Place& place) const {
+    if (!sources_.channels.is_wet || sources_.region.shape.step != 1) {
+        return false;
+    }
+    const std::int32_t stride = sources_.region.shape.stride();
+    const float* const level = sources_.channels.levels.data() + place.at;
+    float highest = kNoWater;
+    for (std::int32_t z = -1; z <= 1; ++z) {
+        for (std::int32_t x = -1; x <= 1; ++x) {
+            highest = std::max(highest, level[z * stride + x]);
+        }
+    }
+    return highest > kNoWater;
+}
+
+/// The lowest ground of a column and those around it, before banks were raised: those of the
+/// region's outermost columns are not known.
+float ColumnMaker::lowest_around(const Place& place) const {
+    const std::int32_t stride = sources_.region.shape.stride();
+    const float* const ground = sources_.ground.data() + place.at;
+    float lowest = *ground;
+    for (std::int32_t z = -1; z <= 1; ++z) {
+        for (std::int32_t x = -1; x <= 1; ++x) {
+            lowest = std::min(lowest, ground[z * stride + x]);
+        }
+    }
+    return lowest;
+}
+
 std::int32_t ColumnMaker::find_caves(const Place& place) {
     const auto found = sources_.caves.gaps(place.at);
     if (found.empty()) {
@@ -244,7 +274,7 @@ std::int32_t ColumnMaker::find_caves(const Place& place) {
     std::array<CaveGap, kCavesPerColumnMax> gaps;
     std::size_t count = 0;
     const bool keeps_roof =
-        place.water > kNoWater || sources_.channels.nearness[place.at] < kSandWidths;
+        is_by_water(place) || sources_.channels.nearness[place.at] < kSandWidths;
     for (CaveGap gap : found) {
         gap.floor = std::max(gap.floor, kCaveDeepest);
         if (keeps_roof) {
@@ -269,6 +299,16 @@ std::int32_t ColumnMaker::find_caves(const Place& place) {
         CaveGap gap = gaps[i++];
         while (i < count && gaps[i].floor - gap.lid < kWallLeast) {
             gap.lid = std::max(gap.lid, gaps[i++].lid);
+        }
+        if (gap.lid >= place.ground && flooded > gap.floor) {
+            // Where it would spill over the ground beside it, the roof has not fallen in.
+            const float lowest = lowest_around(place);
+            if (std::min(flooded, place.ground) > lowest + kSpillLeast) {
+                gap.lid = lowest - kRoofLeast;
+            }
+            if (gap.lid - gap.floor < kCaveLeast) {
+                continue;
+            }
         }
         const std::int32_t floor = to_256(gap.floor);
         const std::int32_t lid = gap.lid >= place.ground ? place.top256 : to_256(gap.lid);
@@ -364,12 +404,12 @@ std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const
     if (bottom < end) {  // the stack ends below the ground
         const std::uint16_t soil = sources_.constants.palette.soil;
         const auto last = static_cast<std::uint16_t>(layers - 1);
-        out.write({.bottom = bottom,
-                   .top = end,
-                   .middle = bottom,
-                   .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
-                                   place.flow_of(last)),
-                   .from = 0});
+        out.write(
+            {.bottom = bottom,
+             .top = end,
+             .middle = bottom,
+             .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last)),
+             .from = 0});
     }
     return static_cast<std::size_t>(std::max(k, 1) - 1);
 }
@@ -406,8 +446,8 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
     place.column = x + region.apron;
     place.row = z + region.apron;
     place.at = static_cast<std::size_t>(place.row * region.shape.stride() + place.column);
-    place.field_at = sources_.field_first + static_cast<std::size_t>(
-                                                place.row * sources_.field.stride() + place.column);
+    place.field_at = sources_.field_first +
+                     static_cast<std::size_t>(place.row * sources_.field.stride() + place.column);
     place.ground = sources_.banks[place.at];
     place.water = sources_.channels.water[place.at];
     place.top256 = row_.top256[static_cast<std::size_t>(place.column)];
@@ -440,14 +480,13 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
     const Cover cover = cover_of(place);
     const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
     // The cover flows as what it lies on.
-    const bool on_overlay =
-        !overlays_.is_empty() && overlays_.all().back().high == place.top256;
+    const bool on_overlay = !overlays_.is_empty() && overlays_.all().back().high == place.top256;
     LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
     overlays_.cut(rock_top);
     const std::int32_t end = find_caves(place);
-    const std::size_t most = used + LimitWriter::limits_max(
-                                        block_count_ * (sources_.region.layers_built + 1) + 5,
-                                        overlays_.size());
+    const std::size_t most =
+        used + LimitWriter::limits_max(block_count_ * (sources_.region.layers_built + 1) + 5,
+                                       overlays_.size());
     if (limits.size() < most) {
         limits.resize(std::max(most, 2 * limits.size()));
     }

@@ -55,12 +55,13 @@ class ColumnMaker {
     struct Cover;
     struct Block;
 
-
     Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
     void find_blocks(const Place& place);
     void find_lenses(const Place& place, const Block& block);
     void find_sheets(const Place& place);
     Cover cover_of(const Place& place) const;
+    bool is_by_water(const Place& place) const;
+    float lowest_around(const Place& place) const;
     /// Returns where the column ends: a cave that is open to the sky is none.
     std::int32_t find_caves(const Place& place);
     std::int32_t top_flow(const Place& place, std::size_t first) const;
@@ -79,6 +80,7 @@ class ColumnMaker {
         std::int32_t top = 0;
         std::int32_t moved = 0;
     };
+
     std::array<Block, kPlanesPerColumnMax + 1> blocks_{};
     std::size_t block_count_ = 0;
     Overlays overlays_;

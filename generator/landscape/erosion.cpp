@@ -238,7 +238,9 @@ void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConst
     buffers.floats.resize(std::max(buffers.floats.size(), 2 * size + 6 * first_size));
     buffers.points.resize(std::max(buffers.points.size(), (2 * kErosionPoints + 1) * row_size));
     float* memory = buffers.floats.data();
-    const auto take = [&memory](std::size_t count) { return std::exchange(memory, memory + count); };
+    const auto take = [&memory](std::size_t count) {
+        return std::exchange(memory, memory + count);
+    };
     const Slopes whole{.x = relief.slope_x.data(),
                        .z = relief.slope_z.data(),
                        .mask = take(size),

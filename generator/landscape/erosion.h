@@ -14,8 +14,8 @@
 //     mask = (1 - (1 - mask)^1.5) * ease(1.4 |S|);  s += (S < 0 ? 1 : -1) side .5 A 2 pi .75 / p
 //
 // Octaves whose cells are kHalvedPeriod wide or more are found on every second column each way, and
-// between them is the mean: their stripes are so wide that it lies within some hundredths of a voxel
-// of them. Coarse levels leave out octaves with cells under two of their steps.
+// between them is the mean: their stripes are so wide that it lies within some hundredths of a
+// voxel of them. Coarse levels leave out octaves with cells under two of their steps.
 #pragma once
 
 #include "generator/landscape/relief.h"

@@ -170,7 +170,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
 }
 
 /// Dry ground beside water is no lower than kBankUnder below it, so that no water stands in the
-/// air.
+/// air. Where two arms of a river touch, the higher one's column is such a bank.
 void Landscape::raise_banks(const Region& region) {
     constexpr float kBankUnder = 0.7F;
     const RectangleShape& shape = region.shape;
@@ -178,22 +178,30 @@ void Landscape::raise_banks(const Region& region) {
     if (shape.step != 1 || !channels_.is_wet) {
         return;
     }
+    channels_.levels = channels_.water;
     const auto stride = static_cast<std::size_t>(shape.stride());
     const auto width = static_cast<std::size_t>(shape.width);
     const auto higher = [](float a, float b) { return a < b ? b : a; };
-    std::array<float, kRectangleSideMax> highest;  // water of a column and the rows beside it
+    const auto lower = [](float a, float b) { return b < a ? b : a; };
+    std::array<float, kRectangleSideMax> highest;  // of a column and the rows beside it
+    std::array<float, kRectangleSideMax> lowest;   // likewise, of wet columns
     for (std::size_t z = 1; z + 1 < static_cast<std::size_t>(shape.length); ++z) {
-        const float* __restrict const water = channels_.water.data() + z * stride;
-        const float* __restrict const before = water - stride;
-        const float* __restrict const after = water + stride;
+        const float* __restrict const level = channels_.levels.data() + z * stride;
+        const float* __restrict const before = level - stride;
+        const float* __restrict const after = level + stride;
+        const auto wet = [](float one) { return one > kNoWater ? one : -kNoWater; };
         for (std::size_t x = 0; x < width; ++x) {
-            highest[x] = higher(water[x], higher(before[x], after[x]));
+            highest[x] = higher(level[x], higher(before[x], after[x]));
+            lowest[x] = lower(wet(level[x]), lower(wet(before[x]), wet(after[x])));
         }
         float* __restrict const banks = banks_.data() + z * stride;
+        float* __restrict const water = channels_.water.data() + z * stride;
         for (std::size_t x = 1; x + 1 < width; ++x) {
-            const float near = higher(highest[x], higher(highest[x - 1], highest[x + 1]));
-            const float bank = water[x] > kNoWater ? kNoWater : near - kBankUnder;
-            banks[x] = higher(banks[x], bank);
+            const float high = higher(highest[x], higher(highest[x - 1], highest[x + 1]));
+            const float low = lower(lowest[x], lower(lowest[x - 1], lowest[x + 1]));
+            const bool is_wet = level[x] > kNoWater && level[x] - low <= kBankUnder;
+            water[x] = is_wet ? level[x] : kNoWater;
+            banks[x] = higher(banks[x], is_wet ? kNoWater : high - kBankUnder);
         }
     }
 }
@@ -235,7 +243,8 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
             buried[x] = static_cast<std::int32_t>((-lifted[x] - kSlack) * kUnitsPerVoxel) - 1;
         }
     }
-    overhangs_.for_each([&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
+    overhangs_.for_each(
+        [&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
     const auto any_below = [plane](const std::int32_t* low, const std::int32_t* high) {
         std::int32_t found = 0;
         for (std::size_t i = 0; i < plane; ++i) {

@@ -93,10 +93,10 @@ class Landscape {
     std::vector<float> over_;   ///< of the region's shape from here on
     std::vector<float> rest_;
     std::vector<float> ground_;
-    std::vector<float> banks_;         ///< the ground with its banks
-    std::vector<float> soil_;          ///< noise
+    std::vector<float> banks_;          ///< the ground with its banks
+    std::vector<float> soil_;           ///< noise
     std::vector<std::int32_t> buried_;  ///< up to which height in the stack nothing shows, likewise
-    std::vector<std::int32_t> shown_;  ///< height in the stack from which on nothing shows, 1/256
+    std::vector<std::int32_t> shown_;   ///< height in the stack from which on nothing shows, 1/256
 };
 
 }  // namespace terrane

@@ -23,7 +23,8 @@ struct TileSides {
 
 /// The sides that need the fewest tiles; a tile has at most kVectorPad points.
 TileSides tile_sides(std::size_t lines_x, std::size_t lines_z) {
-    constexpr std::array<TileSides, 3> kShapes = {{{.x = 4, .z = 4}, {.x = 5, .z = 3}, {.x = 3, .z = 5}}};
+    constexpr std::array<TileSides, 3> kShapes = {
+        {{.x = 4, .z = 4}, {.x = 5, .z = 3}, {.x = 3, .z = 5}}};
     const auto tiles = [&](const TileSides& sides) {
         return ((lines_x + sides.x - 1) / sides.x) * ((lines_z + sides.z - 1) / sides.z);
     };
@@ -192,11 +193,13 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
     const float* const wander_z = wander_x + plane;
     const std::int64_t origin_x = x.lines[first.first_x];
     const std::int64_t origin_z = z.lines[first.first_z];
+
     struct Tile {
         ValleyPlaces places;
         std::array<MovedPlace, kVectorPad> moved_to;
         std::array<std::size_t, kVectorPad> at;
     };
+
     std::array<Tile, kTilesTogether * kTilesTogether> tiles;
     std::size_t tile_count = 0;
     std::int64_t x_min = INT64_MAX;
@@ -216,8 +219,8 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
             const std::size_t line_x = std::min(tile_x + n % first.width, x.lines.size() - 1);
             const std::size_t line_z = std::min(tile_z + row, z.lines.size() - 1);
             tile.at[n] = line_z * stride + line_x;
-            tile.moved_to[n] = moved(x.lines[line_x], z.lines[line_z], wander_x[tile.at[n]],
-                                     wander_z[tile.at[n]]);
+            tile.moved_to[n] =
+                moved(x.lines[line_x], z.lines[line_z], wander_x[tile.at[n]], wander_z[tile.at[n]]);
             const MovedPlace& place = tile.moved_to[n];
             tile.places.x[n] = static_cast<float>(place.x - origin_x);
             tile.places.z[n] = static_cast<float>(place.z - origin_z);
@@ -339,7 +342,8 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
-    // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z too.
+    // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z
+    // too.
     const std::size_t lines = x.stride();
     const std::size_t plane = lines * z.lines.size() + kVectorPad;
     mixed_.resize(std::max(mixed_.size(), lines * (kValues + 1)));

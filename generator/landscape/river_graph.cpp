@@ -13,7 +13,8 @@ namespace terrane {
 namespace {
 
 constexpr std::int8_t kSink = -1;
-constexpr std::int64_t kMargin = kUpstreamSteps + 2;  ///< cells around those whose reaches are known
+constexpr std::int64_t kMargin =
+    kUpstreamSteps + 2;  ///< cells around those whose reaches are known
 
 struct Step {
     std::int64_t i = 0;

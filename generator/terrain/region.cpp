@@ -184,11 +184,11 @@ void build_flow(Region& region, const TerrainConstants& constants, std::size_t l
     const float* const heights = region.heights.data() + layer * region.plane_size();
     std::int32_t* const flow = region.flow.data() + layer * region.flow_plane_size();
     for (std::int32_t row = 0; row < inner.length; ++row) {
-        kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     heights + static_cast<std::ptrdiff_t>(row + region.apron) * stride +
-                         region.apron,
-                     stride, region.flow_stride, half_per_step);
+        kernels.flow(
+            flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+            region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+            heights + static_cast<std::ptrdiff_t>(row + region.apron) * stride + region.apron,
+            stride, region.flow_stride, half_per_step);
     }
 }
 
@@ -266,8 +266,7 @@ void place_elements(Region& region, const World& world, const std::int32_t* show
     });
     for (const PlacedElement& placed : region.elements) {
         lay_element(region, placed,
-                    region.heights.data() +
-                        static_cast<std::size_t>(placed.element().gap) * plane,
+                    region.heights.data() + static_cast<std::size_t>(placed.element().gap) * plane,
                     true);
     }
 }

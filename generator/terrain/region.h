@@ -48,7 +48,7 @@ struct Region {
     std::int32_t flow_stride = 0;
     std::size_t layers_built = 0;  ///< planes of `heights` and `y256` that hold their layers
     bool elements_lift = true;     ///< veins and caves lift what is above them
-    std::vector<float> stacked;  ///< S, the top of the stack so far
+    std::vector<float> stacked;    ///< S, the top of the stack so far
     std::vector<float> noise;
     std::vector<float> heights;            ///< K planes of shape.padded_size(): H_k
     std::vector<std::int32_t> y256;        ///< K planes, likewise: H_k in 1/256 voxel
@@ -103,13 +103,13 @@ void begin_region(Region& region, const World& world, const ColumnRectangle& rec
 /// Builds the layer above those that are there, without flow and blends.
 void build_layer(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
 
-/// Fills one layer's plane of `region.middle` and marks irregular columns, once its heights are there;
-/// not for the lowest layer.
+/// Fills one layer's plane of `region.middle` and marks irregular columns, once its heights are
+/// there; not for the lowest layer.
 void build_blends(Region& region, const TerrainConstants& constants, std::size_t layer,
                   const RowKernels& kernels);
 
-/// Places elements that lift nothing, once the layers are there: those of gaps whose layer is built,
-/// as far as their layer's top lies below `shown256` in some column of shape.
+/// Places elements that lift nothing, once the layers are there: those of gaps whose layer is
+/// built, as far as their layer's top lies below `shown256` in some column of shape.
 void place_elements(Region& region, const World& world, const std::int32_t* shown256,
                     PlotCache& plots, const RowKernels& kernels);
 
