@@ -288,7 +288,8 @@ void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConst
             to_whole(false);
         }
         float* const sum = o < ErosionConstants::kCoarseOctaves ? coarse_sum : fine_sum;
-        if (shape.step > 1 && octave.period < 2 * static_cast<double>(shape.step)) {
+        if (shape.step > ErosionConstants::kExactSteps &&
+            octave.period < 2 * static_cast<double>(shape.step)) {
             // Stripes that are too narrow to be seen: their mean.
             for (std::size_t i = 0; i < size; ++i) {
                 sum[i] += octave.amplitude * slopes.fade[i] * (1.0F - slopes.mask[i]);

@@ -15,7 +15,8 @@
 //
 // Octaves whose cells are kHalvedPeriod wide or more are found on every second column each way, and
 // between them is the mean: their stripes are so wide that it lies within some hundredths of a
-// voxel of them. Coarse levels leave out octaves with cells under two of their steps.
+// voxel of them. Levels with steps over kExactSteps leave out octaves with cells under two of their
+// steps.
 #pragma once
 
 #include "generator/landscape/relief.h"
@@ -40,7 +41,8 @@ struct ErosionConstants {
     /// The first so many octaves carve valleys before the strata are looked at, the finer ones
     /// roughen what comes of it: put before, they become needles.
     static constexpr std::size_t kCoarseOctaves = 2;
-    static constexpr double kHalvedPeriod = 16;  ///< columns
+    static constexpr double kHalvedPeriod = 16;      ///< columns
+    static constexpr std::int64_t kExactSteps = 16;  ///< columns
 
     std::array<GullyOctave, kNoiseOctavesMax> octaves{};
     std::size_t octave_count = 0;
