@@ -332,32 +332,41 @@ std::int32_t ColumnMaker::find_caves(const Place& place) {
 
 std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
                                      std::int32_t end) const {
-    const auto plane = static_cast<std::ptrdiff_t>(sources_.region.plane_size());
-    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
-    const auto layers = static_cast<std::int32_t>(sources_.region.layers_built);
+    const Region& region = sources_.region;
+    const auto plane = static_cast<std::ptrdiff_t>(region.plane_size());
+    const std::int32_t* y256 = region.y256.data() + place.at;
+    const auto layers = static_cast<std::int32_t>(region.layers_built);
     const LayerRules* const rules = sources_.rules.data();
     static constexpr std::int32_t kNoFlow = 0;
-    const std::int32_t* const flow = place.flow == nullptr ? &kNoFlow : place.flow;
+    const std::int32_t* flow = place.flow == nullptr ? &kNoFlow : place.flow;
     const std::ptrdiff_t flow_plane = place.flow == nullptr ? 0 : place.flow_plane;
+    const std::int32_t moved = block.moved;
     std::int32_t k = 0;
-    while (k < layers && *y256 + block.moved <= block.bottom) {
-        ++k;
+    for (const std::int32_t low = block.bottom - moved; k < layers && *y256 <= low; ++k) {
         y256 += plane;
+        flow += flow_plane;
     }
+    const std::int32_t* middle256 = region.middle.data() + place.at + k * plane;
+    const bool is_regular = region.irregular[place.at] == 0;
     std::int32_t bottom = block.bottom;
     LimitTail below = 0;
     bool below_alone = true;
-    Limit* to = nullptr;  // not null: what is right below was written as it is
-    std::int32_t clear_to = 0;
-    const bool is_regular = sources_.region.irregular[place.at] == 0;
-    const std::int32_t* const middle256 = sources_.region.middle.data() + place.at;
-    for (; k < layers && bottom < end; ++k, y256 += plane) {
-        const std::int32_t top = *y256 + block.moved;
+    // Not null: what is right below was written as it is.
+    Limit* to = bottom == 0 ? out.position() : nullptr;
+    std::int32_t clear_to = out.clear_to();
+    const auto go_on = [&] {
+        ++k;
+        y256 += plane;
+        middle256 += plane;
+        flow += flow_plane;
+    };
+    for (; k < layers && bottom < end; go_on()) {
+        const std::int32_t top = *y256 + moved;
         if (top <= bottom) {
             continue;
         }
         const LayerRules& rule = rules[k];
-        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), flow[k * flow_plane]);
+        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), *flow);
         const std::int32_t blend = below_alone || rule.alone || rule.blend <= 0
                                        ? 0
                                        : std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
@@ -382,19 +391,21 @@ std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const
         bottom = own_end;
         below = tail;
         below_alone = rule.alone;
-        if (is_regular && to != nullptr) {
-            // Whole layers that all stand and blend as they were laid down.
-            const std::int32_t most = std::min(end, clear_to);
-            const std::int32_t* next = y256 + plane;
-            for (; k + 1 < layers && *next + block.moved <= most; next += plane) {
-                ++k;
-                y256 = next;
-                below = tail_of(static_cast<std::uint16_t>(k), flow[k * flow_plane]);
-                bottom = *next + block.moved;
-                put_limit(to, middle256[k * plane] + block.moved, below);
-                put_limit(to + 1, bottom, below);
-                to += 2;
-            }
+        if (!is_regular || to == nullptr) {
+            continue;
+        }
+        // Whole layers that all stand and blend as they were laid down.
+        const std::int32_t most = std::min(end, clear_to) - moved;
+        const std::int32_t begun = k;
+        while (k + 1 < layers && y256[plane] <= most) {
+            go_on();
+            below = tail_of(static_cast<std::uint16_t>(k), *flow);
+            put_limit(to, *middle256 + moved, below);
+            put_limit(to + 1, *y256 + moved, below);
+            to += 2;
+        }
+        if (k > begun) {
+            bottom = *y256 + moved;
             below_alone = rules[k].alone;
         }
     }
