@@ -64,8 +64,11 @@ void CaveField::add(std::size_t i, CaveGap gap) {
 
 void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleShape& shape,
                          const RowKernels& kernels) {
-    const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
+    std::array<Touched, kRectangleSideMax> reached;  // columns of each row
     const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
+    for (std::int32_t row = rows.first; row < rows.end; ++row) {
+        reached[static_cast<std::size_t>(row)] = {.first = shape.width, .end = 0};
+    }
     for (const TubePiece& piece : pieces_of(tube)) {
         const float most = 1.45F * std::max(piece.radius, piece.radius + piece.dr) + 1.0F;
         const float x_end = piece.x + piece.ex;
@@ -74,7 +77,13 @@ void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleS
                                             std::max(piece.x, x_end) + most, shape.x0, shape.width);
         const Touched own_rows = touched(tube.z, std::min(piece.z, z_end) - most,
                                          std::max(piece.z, z_end) + most, shape.z0, shape.length);
+        if (own_columns.first >= own_columns.end) {
+            continue;
+        }
         for (std::int32_t row = own_rows.first; row < own_rows.end; ++row) {
+            Touched& columns = reached[static_cast<std::size_t>(row)];
+            columns.first = std::min(columns.first, own_columns.first);
+            columns.end = std::max(columns.end, own_columns.end);
             const std::int32_t first = row * shape.stride() + own_columns.first;
             kernels.tube({.floor = tube_floor_.data() + first,
                           .lid = tube_lid_.data() + first,
@@ -87,6 +96,7 @@ void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleS
         }
     }
     for (std::int32_t row = rows.first; row < rows.end; ++row) {
+        const Touched columns = reached[static_cast<std::size_t>(row)];
         for (std::int32_t column = columns.first; column < columns.end; ++column) {
             const auto i = static_cast<std::size_t>(row * shape.stride() + column);
             if (tube_lid_[i] > tube_floor_[i] && tube_floor_[i] < ground[i]) {

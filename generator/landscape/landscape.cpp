@@ -246,9 +246,14 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
     overhangs_.for_each(
         [&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
     const auto any_below = [plane](const std::int32_t* low, const std::int32_t* high) {
+        // Mostly the first few tell.
+        constexpr std::size_t kAtOnce = 128;
         std::int32_t found = 0;
-        for (std::size_t i = 0; i < plane; ++i) {
-            found |= static_cast<std::int32_t>(low[i] < high[i]);
+        for (std::size_t i = 0; i < plane && found == 0; i += kAtOnce) {
+            const std::size_t end = std::min(i + kAtOnce, plane);
+            for (std::size_t n = i; n < end; ++n) {
+                found |= static_cast<std::int32_t>(low[n] < high[n]);
+            }
         }
         return found != 0;
     };

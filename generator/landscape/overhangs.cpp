@@ -155,18 +155,9 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
             if (k == region.layers_built) {
                 build_layer(region, terrain, kernels);
             }
-            const float cost = resistance.layers[k].cost;
-            const float* __restrict const top = region.heights.data() + k * plane;
-            float* __restrict const to = raw_top_.data();
-            if (k == 0) {
-                for (std::size_t i = 0; i < plane; ++i) {
-                    to[i] += top[i] * cost;
-                }
-            } else {
-                for (std::size_t i = 0; i < plane; ++i) {
-                    to[i] += (top[i] - (top - plane)[i]) * cost;
-                }
-            }
+            const float* const top = region.heights.data() + k * plane;
+            kernels.raise_tops(raw_top_.data(), k == 0 ? nullptr : top - plane, top,
+                               resistance.layers[k].cost, static_cast<std::int32_t>(plane));
         }
         const float* const top = region.heights.data() + ledge * plane;
         std::uint32_t any_here = 0;
@@ -175,22 +166,18 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
             const auto first = static_cast<std::size_t>(z * shape.stride());
             const auto center =
                 static_cast<std::size_t>((z + margin_z) * field.stride() + margin_x);
-            std::uint32_t* __restrict const lean = lean_.data() + first;
-            const float* __restrict const highest = highest_.data() + center;
-            const float* __restrict const raw = input.raw + center;
-            const float* __restrict const moved = input.moved + center;
-            const float* __restrict const raw_top = raw_top_.data() + first;
-            const float* __restrict const tops = top + first;
-            const float* __restrict const bottoms = tops - plane;
-            for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
-                const auto is_lower = static_cast<std::uint32_t>(raw_top[x] <= highest[x]);
-                const std::uint32_t leans =
-                    static_cast<std::uint32_t>(raw_top[x] > raw[x] - moved[x]) & is_lower &
-                    static_cast<std::uint32_t>(tops[x] - bottoms[x] > kThickLeast);
-                lean[x] |= leans << l;
-                any_here |= leans;
-                any_later |= is_lower;
-            }
+            const LedgeSeen seen = kernels.ledge({.lean = lean_.data() + first + 1,
+                                                  .highest = highest_.data() + center + 1,
+                                                  .raw = input.raw + center + 1,
+                                                  .moved = input.moved + center + 1,
+                                                  .raw_top = raw_top_.data() + first + 1,
+                                                  .top = top + first + 1,
+                                                  .bottom = top - plane + first + 1,
+                                                  .bit = std::uint32_t{1} << l,
+                                                  .thick_least = kThickLeast,
+                                                  .count = shape.width - 2});
+            any_here |= seen.leans;
+            any_later |= seen.is_lower;
         }
         if (any_here != 0) {
             std::copy_n(raw_top_.data(), plane, raw_tops_.data() + l * plane);

@@ -55,48 +55,36 @@ Taps taps_at(std::int64_t eighths) {
 
 using AllTaps = std::array<Taps, kLatticeStep>;
 
-/// A row of columns next to each other, from values of its lattice columns, `lines` a plane: cell
-/// by cell, in which the four points are the same. A last cell that is cut runs over into columns
-/// that come later.
-void mix_columns(const std::array<float*, kValues + 1>& to, float* slope_x, const float* mixed,
-                 std::size_t lines, const AllTaps& taps, std::int32_t first_eighth,
-                 std::int32_t width) {
-    constexpr auto kStep = static_cast<std::int32_t>(kLatticeStep);
-    std::array<std::array<float, kLatticeStep>, 4> weight;
-    std::array<std::array<float, kLatticeStep>, 4> slope;
+static_assert(kSplineCell == kLatticeStep);
+
+/// Shares of values, then of their slopes.
+std::array<SplineShares, 2> shares_of(const AllTaps& taps) {
+    std::array<SplineShares, 2> shares;
     for (std::size_t p = 0; p < 4; ++p) {
         for (std::size_t e = 0; e < kLatticeStep; ++e) {
-            weight[p][e] = taps[e].weight[p];
-            slope[p][e] = taps[e].slope[p];
+            shares[0].of[p][e] = taps[e].weight[p];
+            shares[1].of[p][e] = taps[e].slope[p];
         }
     }
-    const auto mix_cell = [](float* __restrict out, const float* value, const auto& share,
-                             std::int32_t from) {
-        std::array<float, kLatticeStep> sum;
-        for (std::size_t e = 0; e < kLatticeStep; ++e) {
-            sum[e] = share[0][e] * value[0] + share[1][e] * value[1] + share[2][e] * value[2] +
-                     share[3][e] * value[3];
-        }
-        if (from == 0) {
-            std::copy(sum.begin(), sum.end(), out);
-        } else {
-            for (std::int32_t e = from; e < kStep; ++e) {
-                out[e - from] = sum[static_cast<std::size_t>(e)];
-            }
-        }
-    };
-    const auto mix = [&](float* out, const float* values, const auto& share) {
-        std::int32_t from = first_eighth;
-        for (std::int32_t column = 0; column < width; ++values) {
-            mix_cell(out + column, values, share, from);
-            column += kStep - from;
-            from = 0;
-        }
-    };
-    for (std::size_t v = 0; v <= kValues; ++v) {
-        mix(to[v], mixed + v * lines, weight);
+    return shares;
+}
+
+/// A row of columns next to each other, from the values of its lattice columns: cell by cell, in
+/// which the four points are the same. A last cell that is cut runs over into columns that come
+/// later.
+void mix_columns(float* out, const float* values, const SplineShares& shares,
+                 std::int32_t first_eighth, std::int32_t width, const RowKernels& kernels) {
+    std::int32_t column = 0;
+    if (first_eighth > 0) {
+        std::array<float, kSplineCell> cell;
+        kernels.mix_cells(cell.data(), values++, shares, 1);
+        column = kSplineCell - first_eighth;
+        std::copy(cell.begin() + first_eighth, cell.end(), out);
     }
-    mix(slope_x, mixed, slope);
+    if (column < width) {
+        kernels.mix_cells(out + column, values, shares,
+                          (width - column + kSplineCell - 1) / kSplineCell);
+    }
 }
 
 /// A place moved by the noise that makes rivers wind.
@@ -342,6 +330,7 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
+    const std::array<SplineShares, 2> shares = shares_of(taps);
     // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z
     // too.
     const std::size_t lines = x.stride();
@@ -373,8 +362,13 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             out.mountain.data() + first, out.wander_x.data() + first, out.wander_z.data() + first,
             out.slope_z.data() + first};
         if (shape.step == 1) {
-            mix_columns(to, out.slope_x.data() + first, mixed_.data(), lines, taps,
-                        x.eighth.front(), shape.width);
+            const std::int32_t eighth = x.eighth.front();
+            for (std::size_t v = 0; v <= kValues; ++v) {
+                mix_columns(to[v], mixed_.data() + v * lines, shares[0], eighth, shape.width,
+                            kernels);
+            }
+            mix_columns(out.slope_x.data() + first, mixed_.data(), shares[1], eighth, shape.width,
+                        kernels);
             continue;
         }
         for (std::int32_t column = 0; column < shape.width; ++column) {

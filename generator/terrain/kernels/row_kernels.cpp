@@ -465,6 +465,21 @@ void valleys(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count
     }
 }
 
+void mix_cells(float* __restrict out, const float* __restrict values, const SplineShares& shares,
+               std::int32_t cells) {
+    for (std::int32_t cell = 0; cell < cells; ++cell) {
+        const float a = values[cell];
+        const float b = values[cell + 1];
+        const float c = values[cell + 2];
+        const float d = values[cell + 3];
+        float* __restrict const to = out + cell * kSplineCell;
+        for (std::int32_t e = 0; e < kSplineCell; ++e) {
+            to[e] = shares.of[0][e] * a + shares.of[1][e] * b + shares.of[2][e] * c +
+                    shares.of[3][e] * d;
+        }
+    }
+}
+
 void near_reach(const ReachRow& row, const ReachShape& reach) {
     for (std::int32_t first = 0; first < row.count; first += kBlock) {
         const float* __restrict const wander_x = row.wander_x + first;
@@ -520,6 +535,45 @@ bool resist(float* __restrict height, float* __restrict rest, const float* botto
     return any != 0;
 }
 
+void raise_tops(float* __restrict raw_top, const float* bottom, const float* __restrict top,
+                float cost, std::int32_t count) {
+    if (bottom == nullptr) {
+        for (std::int32_t i = 0; i < count; ++i) {
+            raw_top[i] += top[i] * cost;
+        }
+        return;
+    }
+    const float* __restrict const below = bottom;
+    for (std::int32_t i = 0; i < count; ++i) {
+        raw_top[i] += (top[i] - below[i]) * cost;
+    }
+}
+
+LedgeSeen ledge(const LedgeRow& row) {
+    std::uint32_t* __restrict const lean = row.lean;
+    const float* __restrict const highest = row.highest;
+    const float* __restrict const raw = row.raw;
+    const float* __restrict const moved = row.moved;
+    const float* __restrict const raw_top = row.raw_top;
+    const float* __restrict const top = row.top;
+    const float* __restrict const bottom = row.bottom;
+    const std::uint32_t bit = row.bit;
+    const float thick_least = row.thick_least;
+    const std::int32_t count = row.count;
+    std::uint32_t any_leans = 0;
+    std::uint32_t any_lower = 0;
+    for (std::int32_t i = 0; i < count; ++i) {
+        const std::uint32_t is_lower = raw_top[i] <= highest[i] ? bit : 0;
+        const std::uint32_t is_above = raw_top[i] > raw[i] - moved[i] ? bit : 0;
+        const std::uint32_t is_thick = top[i] - bottom[i] > thick_least ? bit : 0;
+        const std::uint32_t leans = is_lower & is_above & is_thick;
+        lean[i] |= leans;
+        any_leans |= leans;
+        any_lower |= is_lower;
+    }
+    return {any_leans, any_lower};
+}
+
 void tube(const TubeRow& row, const TubePiece& piece) {
     constexpr float kFlatFloor = 0.62F;
     constexpr float kCeiling = 0.95F;
@@ -571,8 +625,11 @@ const RowKernels kKernels = {.gradients = gradients,
                              .element_tile = element_tile,
                              .erode = erode,
                              .valleys = valleys,
+                             .mix_cells = mix_cells,
                              .near_reach = near_reach,
                              .resist = resist,
+                             .raise_tops = raise_tops,
+                             .ledge = ledge,
                              .tube = tube};
 
 }  // namespace terrane::TERRANE_KERNEL_SET
