@@ -158,7 +158,7 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     out.nearness.assign(size, kFar);
     out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
-    if (relief.has_rivers && constants.rivers > 0) {
+    if (relief.is_smooth && constants.rivers > 0) {
         find_near(out.near, constants, relief, rivers, shape, kernels);
         for (const NearReach& near : out.near) {
             const std::size_t i = near.column;

@@ -6,7 +6,8 @@
 //     taken if lower; or, within 1.5 w where no other channel is as near, also if higher: a bank
 //     water up to h - 1.4 where d < 1.3 w
 //
-// Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake.
+// Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake. Levels
+// whose relief is not smooth have no channels: they would be single wet columns.
 #pragma once
 
 #include "generator/landscape/relief.h"

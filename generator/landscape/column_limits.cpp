@@ -8,6 +8,10 @@ void Overlays::add(std::int32_t low, std::int32_t high, LimitTail tail) {
     if (low >= high) {
         return;
     }
+    if (overlays_.empty() || overlays_.back().high <= low) {
+        overlays_.push_back({.low = low, .high = high, .tail = tail});
+        return;
+    }
     std::size_t first = 0;  // the first that reaches above `low`
     while (first < overlays_.size() && overlays_[first].high <= low) {
         ++first;

@@ -274,7 +274,7 @@ std::int32_t ColumnMaker::find_caves(const Place& place) {
     std::array<CaveGap, kCavesPerColumnMax> gaps;
     std::size_t count = 0;
     const bool keeps_roof =
-        is_by_water(place) || sources_.channels.nearness[place.at] < kSandWidths;
+        sources_.channels.nearness[place.at] < kSandWidths || is_by_water(place);
     for (CaveGap gap : found) {
         gap.floor = std::max(gap.floor, kCaveDeepest);
         if (keeps_roof) {

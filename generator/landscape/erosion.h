@@ -14,8 +14,8 @@
 //     mask = (1 - (1 - mask)^1.5) * ease(1.4 |S|);  s += (S < 0 ? 1 : -1) side .5 A 2 pi .75 / p
 //
 // Octaves whose cells are kHalvedPeriod wide or more are found on every second column each way, and
-// between them is the mean: their stripes are so wide that it lies within some hundredths of a
-// voxel of them. Levels with steps over kExactSteps leave out octaves with cells under two of their
+// between them is the mean: their stripes are so wide that it lies within a tenth of their
+// amplitude. Levels with steps over kExactSteps leave out octaves with cells under two of their
 // steps.
 #pragma once
 
@@ -41,7 +41,7 @@ struct ErosionConstants {
     /// The first so many octaves carve valleys before the strata are looked at, the finer ones
     /// roughen what comes of it: put before, they become needles.
     static constexpr std::size_t kCoarseOctaves = 2;
-    static constexpr double kHalvedPeriod = 16;      ///< columns
+    static constexpr double kHalvedPeriod = 8;       ///< columns
     static constexpr std::int64_t kExactSteps = 16;  ///< columns
 
     std::array<GullyOctave, kNoiseOctavesMax> octaves{};

@@ -136,7 +136,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
         for (std::vector<float>* raster : {&relief_.crest, &relief_.river}) {
             raster->assign(size, 1.0F);
         }
-        relief_.has_rivers = false;
+        relief_.is_smooth = false;
         return;
     }
     over_.assign(size, 0.0F);

@@ -104,6 +104,11 @@ MovedPlace moved(std::int64_t x, std::int64_t z, float by_x, float by_z) {
             .z_rest = by_z - whole_z};
 }
 
+/// What lies between two intervals.
+float gap(float low, float high, float other_low, float other_high) {
+    return std::max(0.0F, std::max(low - other_high, other_low - high));
+}
+
 float mountain_of(float noise) {
     return 0.1F + 0.9F * smooth_step(-0.2F, 0.3F, noise);
 }
@@ -233,9 +238,19 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
                               .z_min = static_cast<float>(z_min - reference.z) - slack,
                               .z_max = static_cast<float>(z_max - reference.z) + slack},
                              [&](const Reach& one) {
-                                 ReachShape& shape = near_.emplace_back(shape_of_reach(one));
-                                 shape.x = static_cast<float>(one.x - origin_x);
-                                 shape.z = static_cast<float>(one.z - origin_z);
+                                 const auto x_of = static_cast<float>(one.x - origin_x);
+                                 const auto z_of = static_cast<float>(one.z - origin_z);
+                                 const float gap_x = gap(x_of + one.x_min, x_of + one.x_max,
+                                                         static_cast<float>(x_min - origin_x),
+                                                         static_cast<float>(x_max - origin_x));
+                                 const float gap_z = gap(z_of + one.z_min, z_of + one.z_max,
+                                                         static_cast<float>(z_min - origin_z),
+                                                         static_cast<float>(z_max - origin_z));
+                                 if (gap_x * gap_x + gap_z * gap_z < slack * slack) {
+                                     ReachShape& shape = near_.emplace_back(shape_of_reach(one));
+                                     shape.x = x_of;
+                                     shape.z = z_of;
+                                 }
                              });
     for (std::size_t t = 0; t < tile_count; ++t) {
         Tile& tile = tiles[t];
@@ -292,8 +307,7 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
                                        &out.slope_x, &out.slope_z, &out.wander_x, &out.wander_z}) {
         raster->resize(size);
     }
-    out.has_rivers = shape.step <= constants.rivers.cell_x;
-    if (!out.has_rivers) {
+    if (shape.step > constants.rivers.cell_x) {
         // Half way between a river and a crest, without their shapes.
         constexpr float kMeanCrest = 0.5F;
         noise_rectangle(out.mountain.data(), constants.mountains, shape, kernels, buffers);

@@ -50,8 +50,7 @@ struct ReliefRasters {
     std::vector<float> slope_z;
     std::vector<float> wander_x;  ///< columns by which the place is moved before a river is sought
     std::vector<float> wander_z;
-    bool has_rivers = false;  ///< false at levels that are too coarse for them
-    bool is_smooth = false;   ///< false: there are no slopes
+    bool is_smooth = false;  ///< false at coarse levels: there are no slopes, and no channels
 };
 
 /// Builds relief for one worker; keeps its rivers and buffers.
