@@ -7,34 +7,22 @@
 namespace terrane {
 namespace {
 
-constexpr float kFlatFloor = 0.62F;
-constexpr float kCeiling = 0.95F;
 constexpr float kFunnel = 9;  ///< columns around a doline's shaft, and its depth in voxels
 constexpr float kSky = 1e6F;
 
-/// A piece of a tube, prepared.
-struct Piece {
-    TubePoint from;
-    float ex = 0;
-    float ez = 0;
-    float inverse_square = 0;
-    float dy = 0;
-    float dr = 0;
-    float steep = 1;  ///< sqrt(1 + slope^2)
-    float y_min = 0;
-    float y_max = 0;
-};
-
-std::array<Piece, kTubePoints - 1> pieces_of(const Tube& tube) {
-    std::array<Piece, kTubePoints - 1> pieces;
+std::array<TubePiece, kTubePoints - 1> pieces_of(const Tube& tube) {
+    std::array<TubePiece, kTubePoints - 1> pieces;
     for (std::size_t p = 0; p + 1 < kTubePoints; ++p) {
         const TubePoint& a = tube.points[p];
         const TubePoint& b = tube.points[p + 1];
-        Piece& piece = pieces[p];
-        piece = {.from = a,
+        TubePiece& piece = pieces[p];
+        piece = {.x = a.x,
+                 .z = a.z,
                  .ex = b.x - a.x,
                  .ez = b.z - a.z,
+                 .y = a.y,
                  .dy = b.y - a.y,
+                 .radius = a.radius,
                  .dr = b.radius - a.radius,
                  .y_min = std::min(a.y, b.y),
                  .y_max = std::max(a.y, b.y)};
@@ -74,98 +62,121 @@ void CaveField::add(std::size_t i, CaveGap gap) {
     pool_[places_[i] * kCavesPerColumnMax + counts_[i]++] = gap;
 }
 
-void CaveField::add_tube(const Tube& tube, const RectangleShape& shape) {
-    const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
+void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleShape& shape,
+                         const RowKernels& kernels) {
+    std::array<Touched, kRectangleSideMax> reached;  // columns of each row
     const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
-    if (columns.first >= columns.end || rows.first >= rows.end) {
-        return;
+    for (std::int32_t row = rows.first; row < rows.end; ++row) {
+        reached[static_cast<std::size_t>(row)] = {.first = shape.width, .end = 0};
     }
-    for (const Piece& piece : pieces_of(tube)) {
-        const float most = 1.45F * std::max(piece.from.radius, piece.from.radius + piece.dr) + 1.0F;
-        const float x_end = piece.from.x + piece.ex;
-        const float z_end = piece.from.z + piece.ez;
-        const Touched own_columns =
-            touched(tube.x, std::min(piece.from.x, x_end) - most,
-                    std::max(piece.from.x, x_end) + most, shape.x0, shape.width);
-        const Touched own_rows =
-            touched(tube.z, std::min(piece.from.z, z_end) - most,
-                    std::max(piece.from.z, z_end) + most, shape.z0, shape.length);
+    for (const TubePiece& piece : pieces_of(tube)) {
+        const float most = 1.45F * std::max(piece.radius, piece.radius + piece.dr) + 1.0F;
+        const float x_end = piece.x + piece.ex;
+        const float z_end = piece.z + piece.ez;
+        const Touched own_columns = touched(tube.x, std::min(piece.x, x_end) - most,
+                                            std::max(piece.x, x_end) + most, shape.x0, shape.width);
+        const Touched own_rows = touched(tube.z, std::min(piece.z, z_end) - most,
+                                         std::max(piece.z, z_end) + most, shape.z0, shape.length);
+        if (own_columns.first >= own_columns.end) {
+            continue;
+        }
         for (std::int32_t row = own_rows.first; row < own_rows.end; ++row) {
-            const float az = static_cast<float>(shape.z0 + row - tube.z) - piece.from.z;
-            for (std::int32_t column = own_columns.first; column < own_columns.end; ++column) {
-                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-                const float ax = static_cast<float>(shape.x0 + column - tube.x) - piece.from.x;
-                const float t = clamp01((ax * piece.ex + az * piece.ez) * piece.inverse_square);
-                const float qx = ax - t * piece.ex;
-                const float qz = az - t * piece.ez;
-                const float r = (piece.from.radius + t * piece.dr) *
-                                (1.0F + 0.25F * rough_[i] + 0.15F * ragged_[i]);
-                const float rest = r * r - (qx * qx + qz * qz);
-                if (rest <= 0) {
-                    continue;
-                }
-                const float hh = std::sqrt(rest);
-                const float up = kCeiling * (1.0F + 0.5F * ragged_[i]);
-                const float y = piece.from.y + t * piece.dy;
-                const float reach = hh * piece.steep;
-                CaveGap& gap = tube_[i];
-                gap.lid = std::max(gap.lid, std::min(y + up * reach, piece.y_max + up * hh));
-                gap.floor = std::min(
-                    gap.floor, std::max(y - kFlatFloor * reach, piece.y_min - kFlatFloor * hh));
-            }
+            Touched& columns = reached[static_cast<std::size_t>(row)];
+            columns.first = std::min(columns.first, own_columns.first);
+            columns.end = std::max(columns.end, own_columns.end);
+            const std::int32_t first = row * shape.stride() + own_columns.first;
+            kernels.tube({.floor = tube_floor_.data() + first,
+                          .lid = tube_lid_.data() + first,
+                          .rough = rough_.data() + first,
+                          .ragged = ragged_.data() + first,
+                          .x = static_cast<float>(shape.x0 + own_columns.first - tube.x),
+                          .z = static_cast<float>(shape.z0 + row - tube.z),
+                          .count = own_columns.end - own_columns.first},
+                         piece);
         }
     }
     for (std::int32_t row = rows.first; row < rows.end; ++row) {
+        const Touched columns = reached[static_cast<std::size_t>(row)];
         for (std::int32_t column = columns.first; column < columns.end; ++column) {
             const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-            if (tube_[i].lid > tube_[i].floor) {
-                add(i, tube_[i]);
+            if (tube_lid_[i] > tube_floor_[i] && tube_floor_[i] < ground[i]) {
+                add(i, {.floor = tube_floor_[i], .lid = tube_lid_[i]});
             }
-            tube_[i] = {.floor = kSky, .lid = -kSky};
+            tube_floor_[i] = kSky;
+            tube_lid_[i] = -kSky;
         }
     }
 }
 
-void CaveField::build(const CaveConstants& constants, const CaveGraph& graph,
+void CaveField::build(const CaveConstants& constants, const CaveGraph& graph, const float* ground,
                       const RectangleShape& shape, const RowKernels& kernels,
                       NoiseBuffers& buffers) {
-    counts_.clear();
+    clear();
     pool_used_ = 0;
-    if (shape.step != 1 || (graph.tubes().empty() && graph.dolines().empty())) {
+    if (shape.step != 1) {
         return;
     }
-    const std::size_t size = shape.padded_size();
-    counts_.assign(size, 0);
-    places_.assign(size, 0);
-    rough_.resize(size);
-    ragged_.resize(size);
-    noise_rectangle(rough_.data(), constants.rough, shape, kernels, buffers);
-    noise_rectangle(ragged_.data(), constants.ragged, shape, kernels, buffers);
-    tube_.assign(size, {.floor = kSky, .lid = -kSky});
-    for (const Tube& tube : graph.tubes()) {
-        add_tube(tube, shape);
+    float highest = 0;
+    for (std::int32_t row = 0; row < shape.length; ++row) {
+        const float* const first = ground + static_cast<std::ptrdiff_t>(row) * shape.stride();
+        highest = std::max(highest, *std::max_element(first, first + shape.width));
     }
-    for (const Doline& doline : graph.dolines()) {
+    bool is_ready = false;
+    const auto make_ready = [&] {
+        if (is_ready) {
+            return;
+        }
+        is_ready = true;
+        const std::size_t size = shape.padded_size();
+        counts_.assign(size, 0);
+        places_.resize(size);
+        rough_.resize(size);
+        ragged_.resize(size);
+        noise_rectangle(rough_.data(), constants.rough, shape, kernels, buffers);
+        noise_rectangle(ragged_.data(), constants.ragged, shape, kernels, buffers);
+        tube_floor_.assign(size, kSky);
+        tube_lid_.assign(size, -kSky);
+    };
+    const auto add_doline = [&](const Doline& doline) {
         const float most = 1.45F * doline.radius + 1.0F;
         const Touched columns = touched(doline.x, -most, most, shape.x0, shape.width);
         const Touched rows = touched(doline.z, -most, most, shape.z0, shape.length);
+        if (columns.first >= columns.end || rows.first >= rows.end || doline.y >= highest) {
+            return;
+        }
+        make_ready();
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
             for (std::int32_t column = columns.first; column < columns.end; ++column) {
                 const auto i = static_cast<std::size_t>(row * shape.stride() + column);
                 const auto x = static_cast<float>(shape.x0 + column - doline.x);
                 const auto z = static_cast<float>(shape.z0 + row - doline.z);
                 const float r = doline.radius * (1.0F + 0.25F * rough_[i] + 0.15F * ragged_[i]);
-                if (x * x + z * z < r * r) {
+                if (x * x + z * z < r * r && doline.y < ground[i]) {
                     add(i, {.floor = doline.y, .lid = kSky});
                 }
             }
+        }
+    };
+    for (const CaveCell& cell : graph.cells()) {
+        for (const Tube& tube : cell.tubes) {
+            const Touched columns = touched(tube.x, tube.x_min, tube.x_max, shape.x0, shape.width);
+            const Touched rows = touched(tube.z, tube.z_min, tube.z_max, shape.z0, shape.length);
+            if (columns.first < columns.end && rows.first < rows.end && tube.y_min < highest) {
+                make_ready();
+                add_tube(tube, ground, shape, kernels);
+            }
+        }
+    }
+    for (const CaveCell& cell : graph.cells()) {
+        for (const Doline& doline : cell.dolines) {
+            add_doline(doline);
         }
     }
 }
 
 void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
                  const RectangleShape& shape) {
-    for (const Doline& doline : graph.dolines()) {
+    const auto cut = [&](const Doline& doline) {
         const float most = doline.radius + kFunnel + 1.0F;
         const Touched columns = touched(doline.x, -most, most, shape.x0, shape.width);
         const Touched rows = touched(doline.z, -most, most, shape.z0, shape.length);
@@ -179,6 +190,9 @@ void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
                 ground[i] -= kFunnel * down * allowed[i];
             }
         }
+    };
+    for (const CaveCell& cell : graph.cells()) {
+        std::for_each(cell.dolines.begin(), cell.dolines.end(), cut);
     }
 }
 

@@ -96,6 +96,7 @@ Tube make_tube(const CaveConstants& constants, const CaveNode& from, const CaveN
         tube.x_max = p == 0 ? point.x + most : std::max(tube.x_max, point.x + most);
         tube.z_min = p == 0 ? point.z - most : std::min(tube.z_min, point.z - most);
         tube.z_max = p == 0 ? point.z + most : std::max(tube.z_max, point.z + most);
+        tube.y_min = p == 0 ? point.y - most : std::min(tube.y_min, point.y - most);
     }
     return tube;
 }
@@ -142,54 +143,69 @@ void CaveGraph::build(const CaveConstants& constants, const FoldConstants& folds
         floor_div(shape.x0 + (shape.width - 1) * shape.step, constants.cell) + kCellsAfter;
     const std::int64_t j1 =
         floor_div(shape.z0 + (shape.length - 1) * shape.step, constants.cell) + kCellsAfter;
-    const std::array<std::int64_t, 4> range = {i0, i1, j0, j1};
-    if (is_built_ && range == range_) {
+    const std::int64_t width = i1 - i0 + 1;
+    const std::int64_t length = j1 - j0 + 1;
+    if (i0 == first_i_ && j0 == first_j_ && width == width_ && length == length_) {
         return;
     }
-    is_built_ = true;
-    range_ = range;
-    tubes_.clear();
-    dolines_.clear();
     const std::size_t levels = constants.horizons.size();
-    const std::int64_t width = i1 - i0 + 2;
-    std::vector<std::optional<CaveNode>> nodes;
-    for (std::int64_t j = j0; j <= j1 + 1; ++j) {
-        for (std::int64_t i = i0; i <= i1 + 1; ++i) {
-            for (std::size_t level = 0; level < levels; ++level) {
-                nodes.push_back(make_node(constants, folds, i, j, level));
-            }
-        }
-    }
+    // A cell's nodes, made when they are first asked for.
+    std::vector<std::vector<std::optional<CaveNode>>> nodes(
+        static_cast<std::size_t>((width + 1) * (length + 1)));
     const auto node = [&](std::int64_t i, std::int64_t j, std::size_t level) {
-        return nodes[static_cast<std::size_t>((j - j0) * width + (i - i0)) * levels + level];
+        auto& of_cell = nodes[static_cast<std::size_t>((j - j0) * (width + 1) + (i - i0))];
+        for (std::size_t l = of_cell.size(); l < levels; ++l) {
+            of_cell.push_back(make_node(constants, folds, i, j, l));
+        }
+        return of_cell[level];
     };
-    for (std::int64_t j = j0; j <= j1; ++j) {
-        for (std::int64_t i = i0; i <= i1; ++i) {
-            for (std::size_t level = 0; level < levels; ++level) {
-                const auto from = node(i, j, level);
-                if (!from) {
-                    continue;
+    const auto fill = [&](CaveCell& cell, std::int64_t i, std::int64_t j) {
+        cell.tubes.clear();
+        cell.dolines.clear();
+        for (std::size_t level = 0; level < levels; ++level) {
+            const auto from = node(i, j, level);
+            if (!from) {
+                continue;
+            }
+            const auto join = [&](bool wanted, std::int64_t to_i, std::int64_t to_j,
+                                  std::size_t to_level, Link link) {
+                if (!wanted) {
+                    return;
                 }
-                const auto join = [&](bool wanted, const std::optional<CaveNode>& to, Link link) {
-                    if (wanted && to) {
-                        tubes_.push_back(make_tube(constants, *from, *to, link));
-                    }
-                };
-                join(from->east, node(i + 1, j, level), Link::east);
-                join(from->south, node(i, j + 1, level), Link::south);
-                join(from->diagonal, node(i + 1, j + 1, level), Link::diagonal);
-                if (level + 1 < levels) {
-                    join(from->up, node(i, j, level + 1), Link::up);
+                if (const auto to = node(to_i, to_j, to_level)) {
+                    cell.tubes.push_back(make_tube(constants, *from, *to, link));
                 }
-                if (from->opens) {
-                    dolines_.push_back({.x = from->x,
+            };
+            join(from->east, i + 1, j, level, Link::east);
+            join(from->south, i, j + 1, level, Link::south);
+            join(from->diagonal, i + 1, j + 1, level, Link::diagonal);
+            join(from->up && level + 1 < levels, i, j, level + 1, Link::up);
+            if (from->opens) {
+                cell.dolines.push_back({.x = from->x,
                                         .z = from->z,
                                         .y = from->y,
                                         .radius = std::max(2.0F, 0.6F * from->radius)});
-                }
+            }
+        }
+    };
+    std::swap(cells_, before_);
+    cells_.resize(static_cast<std::size_t>(width * length));
+    for (std::int64_t j = j0; j <= j1; ++j) {
+        for (std::int64_t i = i0; i <= i1; ++i) {
+            CaveCell& cell = cells_[static_cast<std::size_t>((j - j0) * width + (i - i0))];
+            if (i >= first_i_ && i < first_i_ + width_ && j >= first_j_ && j < first_j_ + length_) {
+                std::swap(
+                    cell,
+                    before_[static_cast<std::size_t>((j - first_j_) * width_ + (i - first_i_))]);
+            } else {
+                fill(cell, i, j);
             }
         }
     }
+    first_i_ = i0;
+    first_j_ = j0;
+    width_ = width;
+    length_ = length;
 }
 
 }  // namespace terrane

@@ -65,6 +65,7 @@ struct Tube {
     float x_max = 0;
     float z_min = 0;
     float z_max = 0;
+    float y_min = 0;  ///< no floor is lower
 };
 
 /// A shaft to the sky and the funnel around its mouth.
@@ -75,22 +76,28 @@ struct Doline {
     float radius = 0;
 };
 
+/// What begins in a cell.
+struct CaveCell {
+    std::vector<Tube> tubes;
+    std::vector<Doline> dolines;
+};
+
 /// Everything that can be met in a rectangle of columns, cells ascending. Kept from region to
-/// region: neighbours ask for the same cells.
+/// region: neighbours ask for the same cells, or for most of them.
 class CaveGraph {
   public:
     void build(const CaveConstants& constants, const FoldConstants& folds,
                const RectangleShape& shape);
 
-    const std::vector<Tube>& tubes() const { return tubes_; }
-
-    const std::vector<Doline>& dolines() const { return dolines_; }
+    std::span<const CaveCell> cells() const { return cells_; }
 
   private:
-    bool is_built_ = false;
-    std::array<std::int64_t, 4> range_{};
-    std::vector<Tube> tubes_;
-    std::vector<Doline> dolines_;
+    std::int64_t first_i_ = 0;
+    std::int64_t first_j_ = 0;
+    std::int64_t width_ = 0;
+    std::int64_t length_ = 0;
+    std::vector<CaveCell> cells_;
+    std::vector<CaveCell> before_;
 };
 
 /// Voxels from floor to lid in one column.
@@ -102,9 +109,11 @@ struct CaveGap {
 /// The gaps of a rectangle's columns.
 class CaveField {
   public:
-    /// Overwrites the field; empty above level 0.
-    void build(const CaveConstants& constants, const CaveGraph& graph, const RectangleShape& shape,
-               const RowKernels& kernels, NoiseBuffers& buffers);
+    /// Overwrites the field: level 0's gaps as far as they begin under the ground.
+    void build(const CaveConstants& constants, const CaveGraph& graph, const float* ground,
+               const RectangleShape& shape, const RowKernels& kernels, NoiseBuffers& buffers);
+
+    void clear() { counts_.clear(); }
 
     std::span<const CaveGap> gaps(std::size_t i) const {
         if (counts_.empty()) {
@@ -115,7 +124,8 @@ class CaveField {
 
   private:
     void add(std::size_t i, CaveGap gap);
-    void add_tube(const Tube& tube, const RectangleShape& shape);
+    void add_tube(const Tube& tube, const float* ground, const RectangleShape& shape,
+                  const RowKernels& kernels);
 
     std::vector<std::uint8_t> counts_;
     std::vector<std::uint32_t> places_;
@@ -123,7 +133,8 @@ class CaveField {
     std::uint32_t pool_used_ = 0;
     std::vector<float> rough_;
     std::vector<float> ragged_;
-    std::vector<CaveGap> tube_;  ///< of one tube, while it is being added
+    std::vector<float> tube_floor_;  ///< of one tube, while it is being added
+    std::vector<float> tube_lid_;
 };
 
 /// Lowers the ground around the mouths of dolines; `allowed` is 0 where water would run in and 1

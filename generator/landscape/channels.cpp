@@ -3,6 +3,7 @@
 #include "generator/landscape/numbers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrane {
@@ -76,7 +77,8 @@ Lookers lookers(float low, float high, float wander_min, float wander_max, std::
 
 /// Each column within `out` of each wet reach, reach by reach.
 void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
-               const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape) {
+               const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape,
+               const RowKernels& kernels) {
     found.clear();
     const Wander wander = wander_of(relief, shape);
     for (const Reach& reach : rivers.reaches()) {
@@ -91,28 +93,39 @@ void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
                                         wander.x_min, wander.x_max, shape.step, shape.width);
         const Lookers rows = lookers(z0 + reach.z_min - out, z0 + reach.z_max + out, wander.z_min,
                                      wander.z_max, shape.step, shape.length);
+        if (columns.first >= columns.end) {
+            continue;
+        }
+        const ReachShape shape_of = shape_of_reach(reach);
+        std::array<float, kRectangleSideMax + kVectorPad> square;
+        std::array<float, kRectangleSideMax + kVectorPad> along;
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
-            for (std::int32_t column = columns.first; column < columns.end; ++column) {
-                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
-                // From the reach, not from the region: the same bits for every region.
-                const float x = static_cast<float>(shape.x0 + column * shape.step - reach.x) +
-                                relief.wander_x[i];
-                const float z =
-                    static_cast<float>(shape.z0 + row * shape.step - reach.z) + relief.wander_z[i];
-                if (x < reach.x_min - out || x > reach.x_max + out || z < reach.z_min - out ||
-                    z > reach.z_max + out) {
+            const auto first = static_cast<std::size_t>(row * shape.stride() + columns.first);
+            const std::int32_t count = columns.end - columns.first;
+            // From the reach, not from the region: the same bits for every region.
+            kernels.near_reach(
+                {.square = square.data(),
+                 .along = along.data(),
+                 .wander_x = relief.wander_x.data() + first,
+                 .wander_z = relief.wander_z.data() + first,
+                 .x = static_cast<float>(shape.x0 + columns.first * shape.step - reach.x),
+                 .z = static_cast<float>(shape.z0 + row * shape.step - reach.z),
+                 .step = static_cast<float>(shape.step),
+                 .count = count},
+                shape_of);
+            for (std::size_t n = 0; n < static_cast<std::size_t>(count); ++n) {
+                if (square[n] >= out * out) {
                     continue;
                 }
-                const OnReach nearest = nearest_on(reach, x, z);
-                const float half_width = half_width_of(constants, reach, nearest.along);
+                const float half_width = half_width_of(constants, reach, along[n]);
                 const float reach_out = out_of(half_width);
-                if (half_width < kDryWidth || nearest.square >= reach_out * reach_out) {
+                if (half_width < kDryWidth || square[n] >= reach_out * reach_out) {
                     continue;
                 }
-                found.push_back({.column = i,
-                                 .distance = std::sqrt(nearest.square),
+                found.push_back({.column = first + n,
+                                 .distance = std::sqrt(square[n]),
                                  .half_width = half_width,
-                                 .level = reach.level + reach.level_change * nearest.along});
+                                 .level = reach.level + reach.level_change * along[n]});
             }
         }
     }
@@ -139,14 +152,14 @@ ChannelConstants::ChannelConstants(const WorldDefinition& definition)
 
 void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,
                   const ReliefRasters& relief, const RiverGraph& rivers,
-                  const RectangleShape& shape) {
+                  const RectangleShape& shape, const RowKernels& kernels) {
     const std::size_t size = shape.padded_size();
     out.water.assign(size, kNoWater);
     out.nearness.assign(size, kFar);
     out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
-    if (relief.has_rivers && constants.rivers > 0) {
-        find_near(out.near, constants, relief, rivers, shape);
+    if (relief.is_smooth && constants.rivers > 0) {
+        find_near(out.near, constants, relief, rivers, shape, kernels);
         for (const NearReach& near : out.near) {
             const std::size_t i = near.column;
             const float nearness = near.distance / near.half_width;
@@ -171,10 +184,12 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
             }
         }
     }
+    out.is_wet = false;
     for (std::size_t i = 0; i < size; ++i) {
         const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;
         const float water = std::max(river, constants.sea);
         out.water[i] = water > ground[i] ? water : kNoWater;
+        out.is_wet = out.is_wet || water > ground[i];
     }
 }
 

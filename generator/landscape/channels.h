@@ -6,7 +6,8 @@
 //     taken if lower; or, within 1.5 w where no other channel is as near, also if higher: a bank
 //     water up to h - 1.4 where d < 1.3 w
 //
-// Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake.
+// Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake. Levels
+// whose relief is not smooth have no channels: they would be single wet columns.
 #pragma once
 
 #include "generator/landscape/relief.h"
@@ -40,15 +41,17 @@ struct NearReach {
 /// Per column of a shape.
 struct ChannelRasters {
     std::vector<float> water;       ///< level, or kNoWater
+    std::vector<float> levels;      ///< where it would stand if arms of a river did not touch
     std::vector<float> nearness;    ///< distance to the nearest channel's middle in its half widths
     std::vector<float> near_count;  ///< channels nearer than 1.5 of their half widths
     std::vector<float> weight;      ///< of the levels that `water` is made of
     std::vector<NearReach> near;    ///< scratch: reach by reach
+    bool is_wet = false;            ///< water stands somewhere
 };
 
 /// Cuts the channels into `ground` and says where water stands; the sea is part of it.
 void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,
                   const ReliefRasters& relief, const RiverGraph& rivers,
-                  const RectangleShape& shape);
+                  const RectangleShape& shape, const RowKernels& kernels);
 
 }  // namespace terrane

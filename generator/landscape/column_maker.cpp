@@ -9,17 +9,19 @@
 namespace terrane {
 namespace {
 
-constexpr float kRoofUnderWater = 5;    ///< voxels of rock left between a cave and open water
-constexpr float kRoofLeast = 1.6F;      ///< voxels: a thinner roof falls in
-constexpr float kWallLeast = 1.5F;      ///< voxels: nearer caves become one
-constexpr float kCaveLeast = 0.8F;      ///< voxels
-constexpr float kCaveDeepest = 2;       ///< voxels above the bottom of the world
+constexpr float kRoofUnderWater = 5;  ///< voxels of rock left between a cave and open water
+constexpr float kRoofLeast = 1.6F;    ///< voxels: a thinner roof falls in
+constexpr float kWallLeast = 1.5F;    ///< voxels: nearer caves become one
+constexpr float kCaveLeast = 0.8F;    ///< voxels
+constexpr float kSpillLeast = 0.5F;   ///< voxels: open water stands so much above ground beside it
+constexpr float kCaveDeepest = 2;     ///< voxels above the bottom of the world
 constexpr float kSteepestSoil = 0.42F;  ///< slope^2 on which no soil lies
 constexpr float kSteepestSnow = 1.1F;
 constexpr float kSnow = 2.2F;         ///< voxels
 constexpr float kSnowLineNoise = 22;  ///< voxels
 constexpr float kLeastCover = 0.25F;  ///< voxels
 constexpr float kSandWidths = 2.2F;   ///< half widths of a river
+constexpr float kLeastSand = 1.2F;    ///< voxels
 constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
 
 std::int32_t to_256(float voxels) {
@@ -45,56 +47,57 @@ struct ColumnMaker::Place {
     }
 };
 
-void ColumnMaker::add_layers(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                             std::int32_t block_top) const {
-    const std::size_t plane = sources_.region.plane_size();
-    const std::int32_t* y256 = sources_.region.y256.data() + place.at;
-    const std::size_t layers = sources_.rules.size();
-    std::int32_t bottom = out.top();
-    const std::int32_t block_bottom = bottom;
-    LimitTail below = 0;
-    bool below_alone = true;
-    for (std::size_t k = 0; k < layers && bottom < block_top; ++k, y256 += plane) {
-        const std::int32_t top = *y256 + moved256;
-        if (top <= bottom) {
-            continue;
-        }
-        const LayerRules& rule = sources_.rules[k];
-        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), place.flow_of(k));
-        const bool blends = bottom > block_bottom && !below_alone && !rule.alone && rule.blend > 0;
-        const std::int32_t blend =
-            blends ? std::max(1, ((top - bottom) * rule.blend + 128) >> 8) : 0;
-        const std::int32_t end = std::min(top, block_top);
-        out.push({.bottom = bottom,
-                  .top = end,
-                  .middle = std::min(bottom + blend, end),
-                  .tail = tail,
-                  .from = below});
-        bottom = end;
-        below = tail;
-        below_alone = rule.alone;
+/// The planes that pass under the ground part the column.
+void ColumnMaker::find_blocks(const Place& place) {
+    const auto planes = sources_.fractures.planes(place.field_at);
+    const float fold = sources_.folds[place.field_at];
+    if (planes.empty()) {
+        blocks_[0] = {.bottom = 0, .top = place.top256, .moved = to_256(fold)};
+        block_count_ = 1;
+        return;
     }
-    if (bottom < block_top) {  // the stack ends below the ground
-        const std::uint16_t soil = sources_.constants.palette.soil;
-        const auto last = static_cast<std::uint16_t>(layers - 1);
-        out.push({.bottom = bottom,
-                  .top = block_top,
-                  .middle = bottom,
-                  .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last,
-                                  place.flow_of(layers - 1)),
-                  .from = 0});
+    std::array<float, kPlanesPerColumnMax + 1> tops{};
+    std::size_t count = 0;
+    for (const PlaneInColumn& plane : planes) {
+        if (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground) {
+            std::size_t place_of = count++;
+            for (; place_of > 0 && tops[place_of - 1] > plane.y; --place_of) {
+                tops[place_of] = tops[place_of - 1];
+            }
+            tops[place_of] = plane.y;
+        }
+    }
+    tops[count++] = place.ground;
+    float bottom = 0;
+    std::int32_t bottom256 = 0;
+    block_count_ = 0;
+    for (std::size_t b = 0; b < count; ++b) {
+        // A plane at the block's bottom lies below it.
+        float moved = fold;
+        for (const PlaneInColumn& plane : planes) {
+            moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
+        }
+        const std::int32_t top256 =
+            b + 1 == count ? place.top256 : std::min(to_256(tops[b]), place.top256);
+        if (top256 > bottom256) {
+            blocks_[block_count_++] = {.bottom = bottom256, .top = top256, .moved = to_256(moved)};
+            bottom256 = top256;
+        }
+        bottom = tops[b];
     }
 }
 
-void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                             std::int32_t block_bottom) const {
+void ColumnMaker::find_lenses(const Place& place, const Block& block) {
     const Region& region = sources_.region;
     std::uint64_t gaps = region.gap_mask[place.at];
     for (std::size_t gap = 0; gaps != 0; ++gap, gaps >>= 1U) {
         if ((gaps & 1U) == 0) {
             continue;
         }
-        const std::int32_t base = region.y256[gap * region.plane_size() + place.at] + moved256;
+        const std::int32_t base = region.y256[gap * region.plane_size() + place.at] + block.moved;
+        if (base >= block.top) {
+            break;  // higher gaps lie higher
+        }
         const std::size_t end =
             gap + 1 < sources_.rules.size() ? region.gap_begin[gap + 1] : region.elements.size();
         for (std::size_t e = region.gap_begin[gap]; e < end; ++e) {
@@ -108,8 +111,8 @@ void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t m
                 region.thickness[element.raster + static_cast<std::size_t>(z * element.stride + x)];
             if (thickness > 0) {
                 const bool is_cave = element.element().type == ElementType::cave;
-                out.replace(
-                    std::max(base, block_bottom), base + to_256(thickness),
+                overlays_.add(
+                    std::max(base, block.bottom), std::min(base + to_256(thickness), block.top),
                     tail_of(static_cast<std::uint16_t>(sources_.world.base_palette.size() + e),
                             is_cave ? 0 : place.flow_of(gap)));
             }
@@ -117,40 +120,7 @@ void ColumnMaker::add_lenses(ColumnRuns& out, const Place& place, std::int32_t m
     }
 }
 
-void ColumnMaker::add_blocks(ColumnRuns& out, const Place& place) const {
-    const auto planes = sources_.fractures.planes(place.field_at);
-    const float fold = sources_.folds[place.field_at];
-    std::array<float, kPlanesPerColumnMax + 1> tops{};
-    std::size_t blocks = 0;
-    for (const PlaneInColumn& plane : planes) {
-        if (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground) {
-            std::size_t place_of = blocks++;
-            for (; place_of > 0 && tops[place_of - 1] > plane.y; --place_of) {
-                tops[place_of] = tops[place_of - 1];
-            }
-            tops[place_of] = plane.y;
-        }
-    }
-    tops[blocks++] = place.ground;
-    float bottom = 0;
-    for (std::size_t b = 0; b < blocks; ++b) {
-        // A plane at the block's bottom lies below it.
-        float moved = fold;
-        for (const PlaneInColumn& plane : planes) {
-            moved += plane.y <= bottom ? -plane.half_throw : plane.half_throw;
-        }
-        const std::int32_t block_bottom = out.top();
-        const std::int32_t block_top =
-            b + 1 == blocks ? place.top256 : std::min(to_256(tops[b]), place.top256);
-        if (block_top > block_bottom) {
-            add_layers(out, place, to_256(moved), block_top);
-            add_lenses(out, place, to_256(moved), block_bottom);
-        }
-        bottom = tops[b];
-    }
-}
-
-void ColumnMaker::add_sheets(ColumnRuns& out, const Place& place) const {
+void ColumnMaker::find_sheets(const Place& place) {
     const auto& fillings = sources_.constants.palette.fillings;
     if (fillings.empty()) {
         return;
@@ -159,61 +129,152 @@ void ColumnMaker::add_sheets(ColumnRuns& out, const Place& place) const {
         if (plane.half_sheet <= 0) {
             continue;
         }
-        const std::int32_t low = to_256(plane.y - plane.half_sheet);
-        const std::int32_t high = to_256(plane.y + plane.half_sheet);
-        if (low >= place.top256 || high <= 0) {
+        const std::int32_t low = std::max(0, to_256(plane.y - plane.half_sheet));
+        const std::int32_t high = std::min(to_256(plane.y + plane.half_sheet), place.top256);
+        if (low >= high) {
             continue;
         }
         const auto& filling = fillings[plane.filling % fillings.size()];
         const std::int32_t flow = place.flow_of(0);
         const std::int32_t rich_from = to_256(place.ground - kEnrichedDepth);
-        out.replace(low, std::min(high, rich_from), tail_of(filling.primary, flow));
-        out.replace(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
+        overlays_.add(low, std::min(high, rich_from), tail_of(filling.primary, flow));
+        overlays_.add(std::max(low, rich_from), high, tail_of(filling.enriched, flow));
     }
 }
 
-void ColumnMaker::add_cover(ColumnRuns& out, const Place& place) const {
+/// What lies on the ground: where it begins, in 1/256 voxel.
+struct ColumnMaker::Cover {
+    std::int32_t soil_from = 0;  ///< or sand; the column's top: there is none
+    std::int32_t snow_from = 0;
+    std::uint16_t soil = 0;
+};
+
+/// Tops and covers of the columns of a row, side by side so that it goes by vectors.
+void ColumnMaker::begin_row(std::int32_t z) {
     const LandscapeConstants& constants = sources_.constants;
-    const auto stride = static_cast<std::size_t>(sources_.region.shape.stride());
-    const float per_column = 0.5F / static_cast<float>(sources_.region.shape.step);
-    const float* const ground = sources_.ground.data() + place.at;
-    const float slope_x = (ground[1] - ground[-1]) * per_column;
-    const float slope_z = (ground[stride] - *(ground - stride)) * per_column;
-    const float square = slope_x * slope_x + slope_z * slope_z;
-    const float noise = sources_.soil[place.at];
-    const LimitTail below = out.last().tail;
-    const auto lay = [&](std::uint16_t id, float thickness) {
-        if (id != LandscapePalette::kNoEntry && thickness >= kLeastCover) {
-            const LimitTail tail = (below & ~LimitTail{0xffff}) | id;
-            out.replace(place.top256 - to_256(thickness), place.top256, tail);
-        }
-    };
-    const float soil = constants.soil * (1.0F - square / kSteepestSoil) *
-                       (0.6F + 0.4F * clamp01(1.0F - sources_.crest[place.at])) *
-                       (1.0F + 0.6F * noise);
-    const bool by_river = sources_.channels.nearness[place.at] < kSandWidths;
-    const bool by_sea = place.ground < constants.sea + kBeach;
-    if ((by_river || by_sea) && square < kSteepestSnow) {
-        lay(constants.palette.sand, std::max(1.2F, soil));
-    } else {
-        lay(constants.palette.soil, soil);
+    const RectangleShape& shape = sources_.region.shape;
+    const std::ptrdiff_t stride = shape.stride();
+    const std::ptrdiff_t first = (z + sources_.region.apron) * stride;
+    const float* __restrict const banks = sources_.banks.data() + first;
+    const std::int32_t count = shape.width;
+    std::int32_t* __restrict const top256 = row_.top256.data();
+    for (std::int32_t i = 0; i < count; ++i) {
+        top256[i] = std::max(to_256(banks[i]), 2 * kUnitsPerVoxel);
     }
-    if (constants.has_snow && place.water == kNoWater) {
-        const float above =
-            (place.ground - constants.snow_line + kSnowLineNoise * noise) * (1.0F / 12.0F);
-        lay(constants.palette.snow, kSnow * clamp01(above) * (1.0F - square / kSteepestSnow));
+    if (!constants.has_relief) {
+        return;
+    }
+    const float per_column = 0.5F / static_cast<float>(shape.step);
+    const float* __restrict const ground = sources_.ground.data() + first;
+    const float* __restrict const before = ground - stride;
+    const float* __restrict const after = ground + stride;
+    const float* __restrict const noise = sources_.soil.data() + first;
+    const float* __restrict const crest = sources_.crest.data() + first;
+    const float* __restrict const nearness = sources_.channels.nearness.data() + first;
+    const float* __restrict const water = sources_.channels.water.data() + first;
+    std::int32_t* __restrict const soil256 = row_.soil256.data();
+    std::int32_t* __restrict const snow256 = row_.snow256.data();
+    std::int32_t* __restrict const is_sand = row_.is_sand.data();
+    const auto thickness256 = [](float thickness) {
+        return thickness >= kLeastCover ? to_256(thickness) : 0;
+    };
+    const float most_soil = constants.soil;
+    const float beach = constants.sea + kBeach;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
+        const float slope_z = (after[i] - before[i]) * per_column;
+        const float square = slope_x * slope_x + slope_z * slope_z;
+        const float soil = most_soil * (1.0F - square / kSteepestSoil) *
+                           (0.6F + 0.4F * clamp01(1.0F - crest[i])) * (1.0F + 0.6F * noise[i]);
+        const auto by_water = static_cast<std::int32_t>(nearness[i] < kSandWidths) |
+                              static_cast<std::int32_t>(banks[i] < beach);
+        const std::int32_t sand = by_water & static_cast<std::int32_t>(square < kSteepestSnow);
+        is_sand[i] = sand;
+        soil256[i] = thickness256(sand != 0 ? std::max(kLeastSand, soil) : soil);
+    }
+    if (!constants.has_snow) {
+        return;
+    }
+    const float snow_line = constants.snow_line;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
+        const float slope_z = (after[i] - before[i]) * per_column;
+        const float square = slope_x * slope_x + slope_z * slope_z;
+        const float above = (banks[i] - snow_line + kSnowLineNoise * noise[i]) * (1.0F / 12.0F);
+        const float snow = kSnow * clamp01(above) * (1.0F - square / kSteepestSnow);
+        snow256[i] = water[i] == kNoWater ? thickness256(snow) : 0;
     }
 }
 
-void ColumnMaker::add_caves(ColumnRuns& out, const Place& place) const {
+ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
+    Cover cover{.soil_from = place.top256, .snow_from = place.top256};
+    if (sources_.constants.has_relief) {
+        const LandscapePalette& palette = sources_.constants.palette;
+        const auto i = static_cast<std::size_t>(place.column);
+        cover.soil = row_.is_sand[i] != 0 ? palette.sand : palette.soil;
+        if (cover.soil != LandscapePalette::kNoEntry) {
+            cover.soil_from = std::max(0, place.top256 - row_.soil256[i]);
+        }
+        if (palette.snow != LandscapePalette::kNoEntry) {
+            cover.snow_from = std::max(0, place.top256 - row_.snow256[i]);
+        }
+    }
+    return cover;
+}
+
+/// The packed flow of the layer at the ground, which is `first` or higher.
+std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const {
+    const Block& block = blocks_[block_count_ - 1];
+    const std::size_t plane = sources_.region.plane_size();
+    const std::int32_t* const y256 = sources_.region.y256.data() + place.at;
+    const std::size_t layers = sources_.region.layers_built;
+    for (std::size_t k = first; k < layers; ++k) {
+        if (y256[k * plane] + block.moved >= block.top) {
+            return place.flow_of(k);
+        }
+    }
+    return place.flow_of(layers - 1);
+}
+
+/// Whether open water stands in a column or beside it.
+bool ColumnMaker::is_by_water(const Place& place) const {
+    if (!sources_.channels.is_wet || sources_.region.shape.step != 1) {
+        return false;
+    }
+    const std::int32_t stride = sources_.region.shape.stride();
+    const float* const level = sources_.channels.levels.data() + place.at;
+    float highest = kNoWater;
+    for (std::int32_t z = -1; z <= 1; ++z) {
+        for (std::int32_t x = -1; x <= 1; ++x) {
+            highest = std::max(highest, level[z * stride + x]);
+        }
+    }
+    return highest > kNoWater;
+}
+
+/// The lowest ground of a column and those around it, before banks were raised: those of the
+/// region's outermost columns are not known.
+float ColumnMaker::lowest_around(const Place& place) const {
+    const std::int32_t stride = sources_.region.shape.stride();
+    const float* const ground = sources_.ground.data() + place.at;
+    float lowest = *ground;
+    for (std::int32_t z = -1; z <= 1; ++z) {
+        for (std::int32_t x = -1; x <= 1; ++x) {
+            lowest = std::min(lowest, ground[z * stride + x]);
+        }
+    }
+    return lowest;
+}
+
+std::int32_t ColumnMaker::find_caves(const Place& place) {
     const auto found = sources_.caves.gaps(place.at);
     if (found.empty()) {
-        return;
+        return place.top256;
     }
     std::array<CaveGap, kCavesPerColumnMax> gaps;
     std::size_t count = 0;
     const bool keeps_roof =
-        place.water > kNoWater || sources_.channels.nearness[place.at] < kSandWidths;
+        sources_.channels.nearness[place.at] < kSandWidths || is_by_water(place);
     for (CaveGap gap : found) {
         gap.floor = std::max(gap.floor, kCaveDeepest);
         if (keeps_roof) {
@@ -239,20 +300,132 @@ void ColumnMaker::add_caves(ColumnRuns& out, const Place& place) const {
         while (i < count && gaps[i].floor - gap.lid < kWallLeast) {
             gap.lid = std::max(gap.lid, gaps[i++].lid);
         }
+        if (gap.lid >= place.ground && flooded > gap.floor) {
+            // Where it would spill over the ground beside it, the roof has not fallen in.
+            const float lowest = lowest_around(place);
+            if (std::min(flooded, place.ground) > lowest + kSpillLeast) {
+                gap.lid = lowest - kRoofLeast;
+            }
+            if (gap.lid - gap.floor < kCaveLeast) {
+                continue;
+            }
+        }
         const std::int32_t floor = to_256(gap.floor);
         const std::int32_t lid = gap.lid >= place.ground ? place.top256 : to_256(gap.lid);
-        out.replace(floor, lid, tail_of(constants.palette.cave_air, 0));
-        if (constants.palette.water != LandscapePalette::kNoEntry && flooded > gap.floor) {
-            out.replace(floor, std::min(lid, to_256(flooded)), tail_of(constants.palette.water, 0));
-        }
+        const bool has_water = constants.palette.water != LandscapePalette::kNoEntry;
+        const std::int32_t wet_to =
+            has_water && flooded > gap.floor ? std::min(lid, to_256(flooded)) : floor;
+        overlays_.add(floor, wet_to, tail_of(constants.palette.water, 0));
+        overlays_.add(std::max(floor, wet_to), lid, tail_of(constants.palette.cave_air, 0));
     }
     // What is open to the sky is no cave.
-    if (palette_id_of(out.last().tail) == constants.palette.cave_air) {
-        out.cut(out.last().bottom);
+    if (!overlays_.is_empty()) {
+        const Overlay& last = overlays_.all().back();
+        if (last.high == place.top256 && palette_id_of(last.tail) == constants.palette.cave_air) {
+            const std::int32_t top = last.low;
+            overlays_.cut(top);
+            return top;
+        }
     }
+    return place.top256;
 }
 
-void ColumnMaker::add_overhang(ColumnRuns& out, const Place& place) const {
+std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
+                                     std::int32_t end) const {
+    const Region& region = sources_.region;
+    const auto plane = static_cast<std::ptrdiff_t>(region.plane_size());
+    const std::int32_t* y256 = region.y256.data() + place.at;
+    const auto layers = static_cast<std::int32_t>(region.layers_built);
+    const LayerRules* const rules = sources_.rules.data();
+    static constexpr std::int32_t kNoFlow = 0;
+    const std::int32_t* flow = place.flow == nullptr ? &kNoFlow : place.flow;
+    const std::ptrdiff_t flow_plane = place.flow == nullptr ? 0 : place.flow_plane;
+    const std::int32_t moved = block.moved;
+    std::int32_t k = 0;
+    for (const std::int32_t low = block.bottom - moved; k < layers && *y256 <= low; ++k) {
+        y256 += plane;
+        flow += flow_plane;
+    }
+    const std::int32_t* middle256 = region.middle.data() + place.at + k * plane;
+    const bool is_regular = region.irregular[place.at] == 0;
+    std::int32_t bottom = block.bottom;
+    LimitTail below = 0;
+    bool below_alone = true;
+    // Not null: what is right below was written as it is.
+    Limit* to = bottom == 0 ? out.position() : nullptr;
+    std::int32_t clear_to = out.clear_to();
+    const auto go_on = [&] {
+        ++k;
+        y256 += plane;
+        middle256 += plane;
+        flow += flow_plane;
+    };
+    for (; k < layers && bottom < end; go_on()) {
+        const std::int32_t top = *y256 + moved;
+        if (top <= bottom) {
+            continue;
+        }
+        const LayerRules& rule = rules[k];
+        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), *flow);
+        const std::int32_t blend = below_alone || rule.alone || rule.blend <= 0
+                                       ? 0
+                                       : std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
+        const std::int32_t own_end = std::min(top, end);
+        const std::int32_t middle = bottom + blend;
+        if (to != nullptr && own_end <= clear_to) {
+            put_limit(to, middle, tail);
+            to += blend == 0 || middle < own_end ? 1 : 0;
+            put_limit(to++, own_end, tail);
+        } else {
+            if (to != nullptr) {
+                out.set_position(to, bottom, below);
+            }
+            out.write({.bottom = bottom,
+                       .top = own_end,
+                       .middle = std::min(middle, own_end),
+                       .tail = tail,
+                       .from = below});
+            clear_to = out.clear_to();
+            to = out.top() == own_end && out.shown() == tail ? out.position() : nullptr;
+        }
+        bottom = own_end;
+        below = tail;
+        below_alone = rule.alone;
+        if (!is_regular || to == nullptr) {
+            continue;
+        }
+        // Whole layers that all stand and blend as they were laid down.
+        const std::int32_t most = std::min(end, clear_to) - moved;
+        const std::int32_t begun = k;
+        while (k + 1 < layers && y256[plane] <= most) {
+            go_on();
+            below = tail_of(static_cast<std::uint16_t>(k), *flow);
+            put_limit(to, *middle256 + moved, below);
+            put_limit(to + 1, *y256 + moved, below);
+            to += 2;
+        }
+        if (k > begun) {
+            bottom = *y256 + moved;
+            below_alone = rules[k].alone;
+        }
+    }
+    if (to != nullptr) {
+        out.set_position(to, bottom, below);
+    }
+    if (bottom < end) {  // the stack ends below the ground
+        const std::uint16_t soil = sources_.constants.palette.soil;
+        const auto last = static_cast<std::uint16_t>(layers - 1);
+        out.write(
+            {.bottom = bottom,
+             .top = end,
+             .middle = bottom,
+             .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last)),
+             .from = 0});
+    }
+    return static_cast<std::size_t>(std::max(k, 1) - 1);
+}
+
+void ColumnMaker::write_overhang(LimitWriter& out, const Place& place) const {
     const Overhang* const overhang = sources_.overhangs.at(place.at);
     if (overhang == nullptr || place.water > kNoWater) {
         return;
@@ -266,47 +439,96 @@ void ColumnMaker::add_overhang(ColumnRuns& out, const Place& place) const {
     if (top <= ground || bottom < ground) {
         return;
     }
-    out.push({.bottom = ground,
-              .top = bottom,
-              .middle = ground,
-              .tail = tail_of(sources_.constants.palette.open_air, 0),
-              .from = 0});
-    out.push({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+    if (bottom > ground) {
+        out.write({.bottom = ground,
+                   .top = bottom,
+                   .middle = ground,
+                   .tail = tail_of(sources_.constants.palette.open_air, 0),
+                   .from = 0});
+    }
+    if (top > bottom) {
+        out.write({.bottom = bottom, .top = top, .middle = bottom, .tail = rock, .from = rock});
+    }
 }
 
-void ColumnMaker::make(ColumnRuns& out, std::int32_t x, std::int32_t z, bool has_flow) const {
+ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool has_flow) const {
     const Region& region = sources_.region;
     Place place;
-    place.column = x + 2;  // the shape has an apron of two columns
-    place.row = z + 2;
+    place.column = x + region.apron;
+    place.row = z + region.apron;
     place.at = static_cast<std::size_t>(place.row * region.shape.stride() + place.column);
-    place.field_at = static_cast<std::size_t>(
-        (place.row + sources_.margin) * sources_.field.stride() + place.column + sources_.margin);
+    place.field_at = sources_.field_first +
+                     static_cast<std::size_t>(place.row * sources_.field.stride() + place.column);
     place.ground = sources_.banks[place.at];
     place.water = sources_.channels.water[place.at];
-    place.top256 = std::max(to_256(place.ground), 2 * kUnitsPerVoxel);
+    place.top256 = row_.top256[static_cast<std::size_t>(place.column)];
     if (has_flow) {
-        place.flow =
-            region.flow.data() + static_cast<std::ptrdiff_t>(z + 1) * region.flow_stride + (x + 1);
+        place.flow = region.flow.data() + static_cast<std::ptrdiff_t>(z) * region.flow_stride + x;
         place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
     }
-    out.clear();
-    add_blocks(out, place);
-    add_sheets(out, place);
-    if (sources_.constants.has_relief) {
-        add_cover(out, place);
+    return place;
+}
+
+void ColumnMaker::mark_elements(std::span<const Limit> limits) {
+    for (const Limit& limit : limits) {
+        const std::size_t id = limit.palette_id;
+        if (id >= sources_.world.base_palette.size()) {
+            element_ids_[id - sources_.world.base_palette.size()] = 0;
+        }
     }
-    add_caves(out, place);
-    const std::uint16_t water = sources_.constants.palette.water;
-    if (place.water > kNoWater && water != LandscapePalette::kNoEntry) {
-        const std::int32_t bed = out.top();
-        out.push({.bottom = bed,
-                  .top = to_256(place.water),
-                  .middle = bed,
-                  .tail = tail_of(water, 0),
-                  .from = 0});
+}
+
+std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
+                               bool has_flow) {
+    const Place place = place_at(x, z, has_flow);
+    find_blocks(place);
+    overlays_.clear();
+    const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
+    for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
+        find_lenses(place, blocks_[b]);
     }
-    add_overhang(out, place);
+    find_sheets(place);
+    const Cover cover = cover_of(place);
+    const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
+    // The cover flows as what it lies on.
+    const bool on_overlay = !overlays_.is_empty() && overlays_.all().back().high == place.top256;
+    LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
+    overlays_.cut(rock_top);
+    const std::int32_t end = find_caves(place);
+    const std::size_t most =
+        used + LimitWriter::limits_max(block_count_ * (sources_.region.layers_built + 1) + 5,
+                                       overlays_.size());
+    if (limits.size() < most) {
+        limits.resize(std::max(most, 2 * limits.size()));
+    }
+    LimitWriter out(limits.data() + used, overlays_.all());
+    std::size_t layer = 0;  // the last of the last block
+    for (std::size_t b = 0; b < block_count_; ++b) {
+        const std::int32_t block_end = std::min({blocks_[b].top, rock_top, end});
+        layer = blocks_[b].bottom < block_end ? write_block(out, place, blocks_[b], block_end) : 0;
+    }
+    if (rock_top < place.top256 && !on_overlay) {
+        cover_flow = tail_of(0, top_flow(place, layer));
+    }
+    const auto lay = [&](std::int32_t from, std::int32_t to, LimitTail tail) {
+        if (from < to) {
+            out.write({.bottom = from, .top = to, .middle = from, .tail = tail, .from = 0});
+        }
+    };
+    const LandscapePalette& palette = sources_.constants.palette;
+    lay(cover.soil_from, std::min(cover.snow_from, end), cover_flow | cover.soil);
+    lay(cover.snow_from, end, cover_flow | palette.snow);
+    if (place.water > kNoWater && palette.water != LandscapePalette::kNoEntry) {
+        lay(out.top(), to_256(place.water), palette.water);
+    }
+    write_overhang(out, place);
+    const Limit* const last = out.end(sources_.world.void_id());
+    const auto now = static_cast<std::size_t>(last - limits.data());
+    // Only columns that lenses meet can show one.
+    if (has_lenses) {
+        mark_elements(std::span(limits).subspan(used, now - used));
+    }
+    return now;
 }
 
 }  // namespace terrane

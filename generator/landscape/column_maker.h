@@ -2,11 +2,14 @@
 //
 // Blocks between fracture planes, each with its layers and lenses; the fillings of fractures; soil,
 // sand and snow; caves and what floods them; open water; an overhang. What comes later replaces
-// what was there, see column_runs.h.
+// what was there. Lenses, fillings and caves are looked for first, as overlays; then limits are
+// written as layers are met, see column_limits.h.
 #pragma once
 
+#include "generator/landscape/column_limits.h"
 #include "generator/landscape/landscape.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -30,31 +33,65 @@ struct ColumnSources {
     const FractureField& fractures;   ///< of the field
     const std::vector<float>& folds;  ///< likewise
     const RectangleShape& field;
-    std::int32_t margin = 0;  ///< columns from the field's side to the shape's
+    std::size_t field_first = 0;  ///< where the shape's first column lies in the field's rasters
 };
 
 class ColumnMaker {
   public:
-    explicit ColumnMaker(const ColumnSources& sources) : sources_(sources) {}
+    /// `element_ids`: those that show in some column become 0.
+    ColumnMaker(const ColumnSources& sources, std::span<std::uint16_t> element_ids)
+        : sources_(sources), element_ids_(element_ids) {}
 
-    /// Overwrites `out` with column (x, z), counted from the rectangle's corner, -1 being its
-    /// apron.
-    void make(ColumnRuns& out, std::int32_t x, std::int32_t z, bool has_flow) const;
+    /// Before the columns of a row.
+    void begin_row(std::int32_t z);
+
+    /// Writes column (x, z), counted from the rectangle's corner, -1 being its apron, behind the
+    /// first `used` limits; returns how many there are then. What is behind them is no column's.
+    std::size_t write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
+                      bool has_flow);
 
   private:
     struct Place;
+    struct Cover;
+    struct Block;
 
-    void add_blocks(ColumnRuns& out, const Place& place) const;
-    void add_layers(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                    std::int32_t block_top) const;
-    void add_lenses(ColumnRuns& out, const Place& place, std::int32_t moved256,
-                    std::int32_t block_bottom) const;
-    void add_sheets(ColumnRuns& out, const Place& place) const;
-    void add_cover(ColumnRuns& out, const Place& place) const;
-    void add_caves(ColumnRuns& out, const Place& place) const;
-    void add_overhang(ColumnRuns& out, const Place& place) const;
+    Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
+    void find_blocks(const Place& place);
+    void find_lenses(const Place& place, const Block& block);
+    void find_sheets(const Place& place);
+    Cover cover_of(const Place& place) const;
+    bool is_by_water(const Place& place) const;
+    float lowest_around(const Place& place) const;
+    /// Returns where the column ends: a cave that is open to the sky is none.
+    std::int32_t find_caves(const Place& place);
+    std::int32_t top_flow(const Place& place, std::size_t first) const;
+    /// Up to `end`; returns the layer there.
+    std::size_t write_block(LimitWriter& out, const Place& place, const Block& block,
+                            std::int32_t end) const;
+    void write_overhang(LimitWriter& out, const Place& place) const;
+    void mark_elements(std::span<const Limit> limits);
 
     ColumnSources sources_;
+    std::span<std::uint16_t> element_ids_;
+
+    /// Of one column: rock between two planes, moved as a whole; heights in 1/256 voxel.
+    struct Block {
+        std::int32_t bottom = 0;
+        std::int32_t top = 0;
+        std::int32_t moved = 0;
+    };
+
+    std::array<Block, kPlanesPerColumnMax + 1> blocks_{};
+    std::size_t block_count_ = 0;
+    Overlays overlays_;
+
+    /// Of a row of the region's shape; heights and thicknesses in 1/256 voxel.
+    struct Row {
+        std::array<std::int32_t, kRectangleSideMax> top256{};
+        std::array<std::int32_t, kRectangleSideMax> soil256{};  ///< or sand; 0: none
+        std::array<std::int32_t, kRectangleSideMax> snow256{};
+        std::array<std::int32_t, kRectangleSideMax> is_sand{};
+    } row_;
 };
 
 }  // namespace terrane

@@ -11,25 +11,34 @@
 namespace terrane {
 namespace {
 
-/// The shape without `margin` columns on each side.
-RectangleShape shrunk(const RectangleShape& shape, std::int32_t margin) {
-    return {.x0 = shape.x0 + margin * shape.step,
-            .z0 = shape.z0 + margin * shape.step,
-            .width = shape.width - 2 * margin,
-            .length = shape.length - 2 * margin,
-            .step = shape.step};
+/// The columns that overhangs look at, and those of a region. At level 0 it begins and ends on even
+/// columns, as the erosion filter wants it.
+RectangleShape field_of(const RectangleShape& shape, std::int32_t apron, std::int32_t reach) {
+    if (shape.step != 1) {
+        return shape;
+    }
+    // Overhangs stand over the rectangle and a column around it.
+    const std::int64_t margin = std::max(0, reach + 1 - apron);
+    const std::int64_t x0 = shape.x0 - margin;
+    const std::int64_t z0 = shape.z0 - margin;
+    const std::int64_t x1 = shape.x0 + shape.width - 1 + margin;
+    const std::int64_t z1 = shape.z0 + shape.length - 1 + margin;
+    RectangleShape field{.x0 = x0 - (x0 & 1), .z0 = z0 - (z0 & 1)};
+    field.width = static_cast<std::int32_t>(x1 + (x1 & 1) - field.x0 + 1);
+    field.length = static_cast<std::int32_t>(z1 + (z1 & 1) - field.z0 + 1);
+    return field;
 }
 
 /// Keeps the inner part of a raster.
-void crop(std::vector<float>& raster, const RectangleShape& from, const RectangleShape& to,
-          std::int32_t margin) {
-    if (margin == 0) {
+void crop(std::vector<float>& raster, const RectangleShape& from, const RectangleShape& to) {
+    const std::int64_t column = to.x0 - from.x0;
+    const std::int64_t row = to.z0 - from.z0;
+    if (from.stride() == to.stride() && column == 0 && row == 0) {
         return;
     }
     for (std::int32_t z = 0; z < to.length; ++z) {
-        const float* const row =
-            raster.data() + static_cast<std::ptrdiff_t>(z + margin) * from.stride() + margin;
-        std::copy(row, row + to.width,
+        const float* const first = raster.data() + (z + row) * from.stride() + column;
+        std::copy(first, first + to.width,
                   raster.data() + static_cast<std::ptrdiff_t>(z) * to.stride());
     }
 }
@@ -61,18 +70,16 @@ LandscapeConstants::LandscapeConstants(const World& world)
 
 Landscape::Landscape(const World& world) : world_(&world), constants_(world) {}
 
-ColumnRectangle Landscape::region_for(const ColumnRectangle& rectangle) {
-    return {.x0 = rectangle.x0 - rectangle.step(),
-            .z0 = rectangle.z0 - rectangle.step(),
-            .width = rectangle.width + 2,
-            .length = rectangle.length + 2,
-            .lod = rectangle.lod};
+/// Where column (x, z) of `shape` lies in the field's rasters.
+std::size_t Landscape::field_index(const RectangleShape& shape, std::int32_t x,
+                                   std::int32_t z) const {
+    // Only at level 0 are the two apart.
+    return static_cast<std::size_t>((shape.z0 - field_.z0 + z) * field_.stride() +
+                                    (shape.x0 - field_.x0 + x));
 }
 
-void Landscape::build_fields(const ColumnRectangle& rectangle, const Region& region,
-                             const RowKernels& kernels) {
-    const std::int32_t margin = rectangle.lod == 0 ? constants_.overhangs.reach : 0;
-    field_ = shrunk(region.shape, -margin);
+void Landscape::build_fields(const Region& region, const RowKernels& kernels) {
+    field_ = field_of(region.shape, region.apron, constants_.overhangs.reach);
     const std::size_t size = field_.padded_size();
     for (std::vector<float>* raster : {&folds_, &raw_, &fine_, &moved_}) {
         raster->resize(size);
@@ -83,12 +90,7 @@ void Landscape::build_fields(const ColumnRectangle& rectangle, const Region& reg
         return;
     }
     relief_builder_.build(relief_, constants_.relief, field_, kernels, noise_);
-    if (relief_.has_rivers) {
-        erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
-    } else {
-        std::fill(raw_.begin(), raw_.end(), constants_.erosion.coarse_amplitude);
-        std::fill(fine_.begin(), fine_.end(), 0.0F);
-    }
+    erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
     for (std::size_t i = 0; i < size; ++i) {
         raw_[i] = relief_.ground[i] + relief_.mountain[i] * raw_[i];
         fine_[i] = relief_.mountain[i] * fine_[i];
@@ -107,23 +109,25 @@ void Landscape::build_fields(const ColumnRectangle& rectangle, const Region& reg
     }
 }
 
-void Landscape::build_ground(const Region& region) {
+void Landscape::build_ground(Region& region, const TerrainConstants& constants,
+                             const RowKernels& kernels) {
     const RectangleShape& shape = region.shape;
-    const auto margin = static_cast<std::int32_t>((shape.x0 - field_.x0) / shape.step);
     const std::size_t size = shape.padded_size();
-    for (std::vector<float>* raster : {&over_, &rest_, &ground_}) {
+    const std::size_t layer_count = constants.rules.size();
+    for (std::vector<float>* raster : {&rest_, &ground_}) {
         raster->resize(size);
     }
     const LayerHeights layers{.first = region.heights.data(), .plane = region.plane_size()};
     if (!constants_.has_relief) {
         // The stack's own top, moved.
-        const float* const top =
-            layers.first + (constants_.resistance.layers.size() - 1) * layers.plane;
+        while (region.layers_built < layer_count) {
+            build_layer(region, constants, kernels);
+        }
+        const float* const top = layers.first + (layer_count - 1) * layers.plane;
         for (std::int32_t z = 0; z < shape.length; ++z) {
             for (std::int32_t x = 0; x < shape.width; ++x) {
                 const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-                const auto at =
-                    static_cast<std::size_t>((z + margin) * field_.stride() + x + margin);
+                const std::size_t at = field_index(shape, x, z);
                 const float folded = top[i] + folds_[at];
                 ground_[i] =
                     std::max(2.0F, folded + displacement_at(fractures_.planes(at), folded));
@@ -132,107 +136,155 @@ void Landscape::build_ground(const Region& region) {
         for (std::vector<float>* raster : {&relief_.crest, &relief_.river}) {
             raster->assign(size, 1.0F);
         }
-        relief_.has_rivers = false;
+        relief_.is_smooth = false;
         return;
     }
+    over_.assign(size, 0.0F);
     for (std::int32_t z = 0; z < shape.length; ++z) {
-        for (std::int32_t x = 0; x < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-            const auto at = static_cast<std::size_t>((z + margin) * field_.stride() + x + margin);
-            over_[i] = raw_[at] - moved_[at];
+        const std::size_t from = field_index(shape, 0, z);
+        float* const over = over_.data() + static_cast<std::ptrdiff_t>(z) * shape.stride();
+        for (std::size_t x = 0; x < static_cast<std::size_t>(shape.width); ++x) {
+            over[x] = raw_[from + x] - moved_[from + x];
         }
     }
-    resist(ground_.data(), rest_.data(), over_.data(), constants_.resistance, layers, size);
+    ResistanceWalk walk(ground_.data(), rest_.data(), over_.data(), size);
+    for (std::size_t k = 0; k < layer_count; ++k) {
+        if (k == region.layers_built) {
+            build_layer(region, constants, kernels);
+        }
+        if (!walk.pass(constants_.resistance.layers[k], layers, k, kernels)) {
+            break;
+        }
+    }
     for (std::int32_t z = 0; z < shape.length; ++z) {
-        for (std::int32_t x = 0; x < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-            const auto at = static_cast<std::size_t>((z + margin) * field_.stride() + x + margin);
+        const std::size_t from = field_index(shape, 0, z);
+        float* const ground = ground_.data() + static_cast<std::ptrdiff_t>(z) * shape.stride();
+        for (std::size_t x = 0; x < static_cast<std::size_t>(shape.width); ++x) {
+            const std::size_t at = from + x;
             const float raw = raw_[at];
             const float share = smooth_step(0.04F, 0.3F, relief_.crest[at]);
-            ground_[i] =
-                std::max(2.0F, raw + (ground_[i] + moved_[at] - raw) * share + fine_[at] * share);
+            ground[x] =
+                std::max(2.0F, raw + (ground[x] + moved_[at] - raw) * share + fine_[at] * share);
         }
     }
 }
 
 /// Dry ground beside water is no lower than kBankUnder below it, so that no water stands in the
-/// air.
+/// air. Where two arms of a river touch, the higher one's column is such a bank.
 void Landscape::raise_banks(const Region& region) {
     constexpr float kBankUnder = 0.7F;
     const RectangleShape& shape = region.shape;
     banks_ = ground_;
-    if (shape.step != 1) {
+    if (shape.step != 1 || !channels_.is_wet) {
         return;
     }
-    const std::int32_t stride = shape.stride();
-    for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
-        for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * stride + x);
-            if (channels_.water[i] > kNoWater) {
-                continue;
-            }
-            float highest = kNoWater;
-            for (std::int32_t dz = -1; dz <= 1; ++dz) {
-                for (std::int32_t dx = -1; dx <= 1; ++dx) {
-                    highest = std::max(
-                        highest,
-                        channels_.water[static_cast<std::size_t>((z + dz) * stride + x + dx)]);
-                }
-            }
-            banks_[i] = std::max(banks_[i], highest - kBankUnder);
+    channels_.levels = channels_.water;
+    const auto stride = static_cast<std::size_t>(shape.stride());
+    const auto width = static_cast<std::size_t>(shape.width);
+    const auto higher = [](float a, float b) { return a < b ? b : a; };
+    const auto lower = [](float a, float b) { return b < a ? b : a; };
+    std::array<float, kRectangleSideMax> highest;  // of a column and the rows beside it
+    std::array<float, kRectangleSideMax> lowest;   // likewise, of wet columns
+    for (std::size_t z = 1; z + 1 < static_cast<std::size_t>(shape.length); ++z) {
+        const float* __restrict const level = channels_.levels.data() + z * stride;
+        const float* __restrict const before = level - stride;
+        const float* __restrict const after = level + stride;
+        const auto wet = [](float one) { return one > kNoWater ? one : -kNoWater; };
+        for (std::size_t x = 0; x < width; ++x) {
+            highest[x] = higher(level[x], higher(before[x], after[x]));
+            lowest[x] = lower(wet(level[x]), lower(wet(before[x]), wet(after[x])));
+        }
+        float* __restrict const banks = banks_.data() + z * stride;
+        float* __restrict const water = channels_.water.data() + z * stride;
+        for (std::size_t x = 1; x + 1 < width; ++x) {
+            const float high = higher(highest[x], higher(highest[x - 1], highest[x + 1]));
+            const float low = lower(lowest[x], lower(lowest[x - 1], lowest[x + 1]));
+            const bool is_wet = level[x] > kNoWater && level[x] - low <= kBankUnder;
+            water[x] = is_wet ? level[x] : kNoWater;
+            banks[x] = higher(banks[x], is_wet ? kNoWater : high - kBankUnder);
         }
     }
 }
 
-/// Flow of the layers that show in some column: what the relief has cut away needs none.
-void Landscape::build_flows(Region& region, const TerrainConstants& constants,
-                            const ColumnRectangle& rectangle, const RowKernels& kernels) {
+/// Layers, lenses and flow as far as they show in some column: what the relief has cut away needs
+/// none, nor what folds have taken under the bottom of the world.
+void Landscape::build_shown(Region& region, const TerrainConstants& constants,
+                            const RowKernels& kernels, PlotCache& plots) {
     constexpr float kSlack = 0.1F;  // voxels; far above rounding errors
     const RectangleShape& shape = region.shape;
-    const auto margin = static_cast<std::int32_t>((shape.x0 - field_.x0) / shape.step);
+    const std::size_t plane = region.plane_size();
     const std::size_t layers = constants.rules.size();
     std::array<bool, kLayersMax> shows{};
     shows[0] = true;
-    shown_.assign(region.plane_size(), 0);
-    for (std::int32_t z = 2; z < rectangle.length + 2; ++z) {
-        for (std::int32_t x = 2; x < rectangle.width + 2; ++x) {
-            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-            const auto at = static_cast<std::size_t>((z + margin) * field_.stride() + x + margin);
-            // The most that any block of the column was lowered by.
-            float moved = folds_[at];
-            for (const PlaneInColumn& plane : fractures_.planes(at)) {
-                moved -= plane.half_throw;
+    shown_.assign(plane, INT32_MIN);
+    buried_.assign(plane, INT32_MAX);
+    const bool has_planes = !fractures_.is_empty();
+    for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
+        const auto first = static_cast<std::size_t>(z * shape.stride());
+        const std::size_t at = field_index(shape, 0, z);
+        // The most that any block of a column was lowered and lifted by.
+        std::array<float, kRectangleSideMax> lowered;
+        std::array<float, kRectangleSideMax> lifted;
+        const auto width = static_cast<std::size_t>(shape.width);
+        std::copy_n(folds_.data() + at, width, lowered.data());
+        std::copy_n(folds_.data() + at, width, lifted.data());
+        for (std::size_t x = 1; has_planes && x + 1 < width; ++x) {
+            for (const PlaneInColumn& one : fractures_.planes(at + x)) {
+                lowered[x] -= one.half_throw;
+                lifted[x] += one.half_throw;
             }
-            shown_[i] = static_cast<std::int32_t>(
-                std::ceil((std::max(banks_[i], 2.0F) - moved + kSlack) * kUnitsPerVoxel));
-            if (const Overhang* const overhang = overhangs_.at(i); overhang != nullptr) {
-                shows[static_cast<std::size_t>(overhang->layer)] = true;
-            }
+        }
+        const float* __restrict const banks = banks_.data() + first;
+        std::int32_t* __restrict const shown = shown_.data() + first;
+        std::int32_t* __restrict const buried = buried_.data() + first;
+        for (std::size_t x = 1; x + 1 < width; ++x) {
+            const float top = std::max(banks[x], 2.0F) - lowered[x] + kSlack;
+            shown[x] = static_cast<std::int32_t>(top * kUnitsPerVoxel) + 1;
+            buried[x] = static_cast<std::int32_t>((-lifted[x] - kSlack) * kUnitsPerVoxel) - 1;
         }
     }
-    for (std::size_t k = 0; k < layers; ++k) {
-        if (!shows[k]) {
-            const std::int32_t* const bottom = region.y256.data() + (k - 1) * region.plane_size();
-            std::int32_t found = 0;
-            for (std::size_t i = 0; i < shown_.size(); ++i) {
-                found |= static_cast<std::int32_t>(bottom[i] < shown_[i]);
+    overhangs_.for_each(
+        [&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
+    const auto any_below = [plane](const std::int32_t* low, const std::int32_t* high) {
+        // Mostly the first few tell.
+        constexpr std::size_t kAtOnce = 128;
+        std::int32_t found = 0;
+        for (std::size_t i = 0; i < plane && found == 0; i += kAtOnce) {
+            const std::size_t end = std::min(i + kAtOnce, plane);
+            for (std::size_t n = i; n < end; ++n) {
+                found |= static_cast<std::int32_t>(low[n] < high[n]);
             }
-            shows[k] = found != 0;
         }
+        return found != 0;
+    };
+    for (std::size_t k = 0; k < layers; ++k) {
+        if (k > 0 && !any_below(region.y256.data() + (k - 1) * plane, shown_.data())) {
+            break;
+        }
+        if (k == region.layers_built) {
+            build_layer(region, constants, kernels);
+        }
+        if (k > 0) {
+            build_blends(region, constants, k, kernels);
+        }
+        shows[k] = shows[k] || any_below(buried_.data(), region.y256.data() + k * plane);
+    }
+    place_elements(region, *world_, shown_.data(), plots, kernels);
+    for (const PlacedElement& placed : region.elements) {
+        shows[static_cast<std::size_t>(placed.element().gap)] = true;
+    }
+    for (std::size_t k = 0; k < region.layers_built; ++k) {
         if (shows[k]) {
             build_flow(region, constants, k, kernels);
         }
     }
 }
 
-void Landscape::write(const ColumnWriterOutput& out, Region& region,
-                      const TerrainConstants& constants, const ColumnRectangle& rectangle,
-                      std::int32_t apron, const RowKernels& kernels) {
+void Landscape::build(Region& region, const TerrainConstants& constants, PlotCache& plots,
+                      const RowKernels& kernels) {
     const RectangleShape& shape = region.shape;
-    build_fields(rectangle, region, kernels);
-    build_ground(region);
-    const auto margin = static_cast<std::int32_t>((shape.x0 - field_.x0) / shape.step);
-    const LayerHeights layers{.first = region.heights.data(), .plane = region.plane_size()};
+    build_fields(region, kernels);
+    build_ground(region, constants, kernels);
     if (shape.step == 1 && constants_.has_relief) {
         overhangs_.build(constants_.overhangs, constants_.resistance,
                          {.field = field_,
@@ -240,14 +292,14 @@ void Landscape::write(const ColumnWriterOutput& out, Region& region,
                           .moved = moved_.data(),
                           .crest = relief_.crest.data(),
                           .fine = fine_.data()},
-                         shape, layers, ground_.data(), kernels, noise_);
+                         region, constants, ground_.data(), kernels, noise_);
     } else {
-        overhangs_ = {};
+        overhangs_.clear();
     }
     if (constants_.has_relief) {
         for (std::vector<float>* raster :
              {&relief_.crest, &relief_.river, &relief_.wander_x, &relief_.wander_z}) {
-            crop(*raster, field_, shape, margin);
+            crop(*raster, field_, shape);
         }
     }
     if (shape.step == 1 && constants_.caves.cell > 0) {
@@ -259,46 +311,57 @@ void Landscape::write(const ColumnWriterOutput& out, Region& region,
         for (float& ground : ground_) {
             ground = std::max(2.0F, ground);
         }
-        caves_.build(constants_.caves, cave_graph_, shape, kernels, noise_);
-    } else {
-        caves_ = {};
     }
     cut_channels(ground_.data(), channels_, constants_.channels, relief_, relief_builder_.rivers(),
-                 shape);
+                 shape, kernels);
     raise_banks(region);
-    build_flows(region, constants, rectangle, kernels);
-    soil_.resize(shape.padded_size());
-    noise_rectangle(soil_.data(), constants_.soil_noise, shape, kernels, noise_);
+    if (shape.step == 1 && constants_.caves.cell > 0) {
+        caves_.build(constants_.caves, cave_graph_, banks_.data(), shape, kernels, noise_);
+    } else {
+        caves_.clear();
+    }
+    build_shown(region, constants, kernels, plots);
+    if (constants_.has_relief) {
+        soil_.resize(shape.padded_size());
+        noise_rectangle(soil_.data(), constants_.soil_noise, shape, kernels, noise_);
+    }
+}
 
+void Landscape::write(const ColumnWriterOutput& out, const Region& region,
+                      const TerrainConstants& constants, std::int32_t apron) {
+    const ColumnRectangle& rectangle = region.inner;
     ColumnGrid& grid = out.grid;
     grid.x_first = grid.z_first = -apron;
     grid.width = rectangle.width + 2 * apron;
     grid.length = rectangle.length + 2 * apron;
     grid.offsets.clear();
     grid.offsets.push_back(0);
-    grid.limits.clear();
     out.element_ids.assign(region.elements.size(), kNoPaletteId);
     out.element_limits.clear();
     out.highest_y256 = 0;
-    const ColumnMaker maker({.world = *world_,
-                             .constants = constants_,
-                             .rules = constants.rules,
-                             .region = region,
-                             .ground = ground_,
-                             .banks = banks_,
-                             .crest = relief_.crest,
-                             .river = relief_.river,
-                             .soil = soil_,
-                             .channels = channels_,
-                             .caves = caves_,
-                             .overhangs = overhangs_,
-                             .fractures = fractures_,
-                             .folds = folds_,
-                             .field = field_,
-                             .margin = margin});
+    ColumnMaker maker({.world = *world_,
+                       .constants = constants_,
+                       .rules = constants.rules,
+                       .region = region,
+                       .ground = ground_,
+                       .banks = banks_,
+                       .crest = relief_.crest,
+                       .river = relief_.river,
+                       .soil = soil_,
+                       .channels = channels_,
+                       .caves = caves_,
+                       .overhangs = overhangs_,
+                       .fractures = fractures_,
+                       .folds = folds_,
+                       .field = field_,
+                       .field_first = field_index(region.shape, 0, 0)},
+                      out.element_ids);
+    std::size_t used = 0;
     for (std::int32_t z = -apron; z < rectangle.length + apron; ++z) {
+        maker.begin_row(z);
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
             const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
+<<<<<<< HEAD
             maker.make(runs_, x, z, is_inner);
             const std::size_t first = grid.limits.size();
             runs_.write(grid.limits, world_->void_id());
@@ -312,11 +375,16 @@ void Landscape::write(const ColumnWriterOutput& out, Region& region,
                     out.element_limits.push_back(static_cast<std::uint32_t>(i));
                 }
             }
+=======
+            used = maker.write(grid.limits, used, x, z, is_inner);
+            grid.offsets.push_back(static_cast<std::uint32_t>(used));
+>>>>>>> land
             if (is_inner) {
-                out.highest_y256 = std::max(out.highest_y256, grid.limits.back().y256);
+                out.highest_y256 = std::max(out.highest_y256, grid.limits[used - 1].y256);
             }
         }
     }
+    grid.limits.resize(used);
     number_elements(out, region, *world_);
 }
 

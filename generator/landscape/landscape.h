@@ -8,7 +8,6 @@
 
 #include "generator/landscape/caves.h"
 #include "generator/landscape/channels.h"
-#include "generator/landscape/column_runs.h"
 #include "generator/landscape/erosion.h"
 #include "generator/landscape/fold.h"
 #include "generator/landscape/fractures.h"
@@ -53,21 +52,26 @@ class Landscape {
   public:
     explicit Landscape(const World& world);
 
-    /// The columns that version 1's region must hold for `rectangle`: one more on each side.
-    static ColumnRectangle region_for(const ColumnRectangle& rectangle);
+    /// Columns around a rectangle that its region must hold.
+    static constexpr std::int32_t kApron = 2;
 
-    /// Overwrites `out` with the rectangle's columns and `apron` more on each side (0 or 1),
-    /// without flow there. `region` is built for region_for(rectangle); its flow is filled in.
-    void write(const ColumnWriterOutput& out, Region& region, const TerrainConstants& constants,
-               const ColumnRectangle& rectangle, std::int32_t apron, const RowKernels& kernels);
+    /// Builds everything that columns are made of. `region` has been begun with kApron; the layers,
+    /// elements and flows that show in some column are built.
+    void build(Region& region, const TerrainConstants& constants, PlotCache& plots,
+               const RowKernels& kernels);
+
+    /// Overwrites `out` with the columns of `region.inner`, the region of `build`, and `apron` more
+    /// on each side (0 or 1), without flow there.
+    void write(const ColumnWriterOutput& out, const Region& region,
+               const TerrainConstants& constants, std::int32_t apron);
 
   private:
-    void build_fields(const ColumnRectangle& rectangle, const Region& region,
-                      const RowKernels& kernels);
-    void build_ground(const Region& region);
+    void build_fields(const Region& region, const RowKernels& kernels);
+    void build_ground(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
     void raise_banks(const Region& region);
-    void build_flows(Region& region, const TerrainConstants& constants,
-                     const ColumnRectangle& rectangle, const RowKernels& kernels);
+    void build_shown(Region& region, const TerrainConstants& constants, const RowKernels& kernels,
+                     PlotCache& plots);
+    std::size_t field_index(const RectangleShape& shape, std::int32_t x, std::int32_t z) const;
 
     const World* world_;
     LandscapeConstants constants_;
@@ -89,10 +93,10 @@ class Landscape {
     std::vector<float> over_;   ///< of the region's shape from here on
     std::vector<float> rest_;
     std::vector<float> ground_;
-    std::vector<float> banks_;         ///< the ground with its banks
-    std::vector<float> soil_;          ///< noise
-    std::vector<std::int32_t> shown_;  ///< height in the stack from which on nothing shows
-    ColumnRuns runs_;
+    std::vector<float> banks_;          ///< the ground with its banks
+    std::vector<float> soil_;           ///< noise
+    std::vector<std::int32_t> buried_;  ///< up to which height in the stack nothing shows, likewise
+    std::vector<std::int32_t> shown_;   ///< height in the stack from which on nothing shows, 1/256
 };
 
 }  // namespace terrane

@@ -4,8 +4,9 @@
 #include "generator/terrain/random.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
+#include <utility>
 
 namespace terrane {
 namespace {
@@ -16,33 +17,64 @@ constexpr float kThickLeast = 4;    ///< voxels
 constexpr float kGapLeast = 1.25F;  ///< voxels
 constexpr float kNothing = -1e9F;
 
-/// highest[i] = the greatest of `values` within `reach` columns either way, in a square.
-void dilate(std::vector<float>& highest, std::vector<float>& rows, const std::vector<float>& values,
-            const RectangleShape& shape, std::int32_t reach) {
-    rows.assign(values.size(), kNothing);
-    highest.assign(values.size(), kNothing);
-    const std::int32_t stride = shape.stride();
-    const auto raise = [](float* __restrict to, const float* __restrict from, std::int32_t count) {
-        for (std::int32_t i = 0; i < count; ++i) {
-            to[i] = to[i] < from[i] ? from[i] : to[i];
+/// to[i] = the greatest of from[i], from[i + stride], ... from[i + 2 * reach * stride]: windows of
+/// 1, 2, 4, ... values, then two that meet. `count` values each; both are memory of as many.
+const float* slide(float* one, float* other, std::size_t count, std::size_t stride,
+                   std::int32_t reach) {
+    const std::size_t window = 2 * static_cast<std::size_t>(reach) + 1;
+    const auto widen = [&](const float* __restrict from, float* __restrict to, std::size_t by) {
+        const std::size_t offset = by * stride;
+        const std::size_t end = count > offset ? count - offset : 0;
+        for (std::size_t i = 0; i < end; ++i) {
+            to[i] = from[i] < from[i + offset] ? from[i + offset] : from[i];
         }
+        std::copy(from + end, from + count, to + end);
     };
-    for (std::int32_t z = 0; z < shape.length; ++z) {
-        const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(z) * stride;
-        for (std::int32_t d = -reach; d <= reach; ++d) {
-            const std::int32_t first = std::max(0, -d);
-            raise(rows.data() + row + first, values.data() + row + first + d,
-                  std::min(shape.width, shape.width - d) - first);
-        }
+    std::size_t width = 1;
+    for (; 2 * width <= window; width *= 2) {
+        widen(one, other, width);
+        std::swap(one, other);
     }
-    for (std::int32_t z = 0; z < shape.length; ++z) {
-        for (std::int32_t d = std::max(-reach, -z); d <= std::min(reach, shape.length - 1 - z);
-             ++d) {
-            raise(highest.data() + static_cast<std::ptrdiff_t>(z) * stride,
-                  rows.data() + static_cast<std::ptrdiff_t>(z + d) * stride, shape.width);
-        }
+    if (width < window) {
+        widen(one, other, window - width);
+        std::swap(one, other);
     }
+    return one;
 }
+
+/// rows[i] = the greatest of `values` within `reach` columns in its row, highest[i] likewise of the
+/// rows within `reach`, for what lies so far inside.
+void dilate(std::vector<float>& highest, std::vector<float>& rows, std::vector<float>& memory,
+            const std::vector<float>& values, const RectangleShape& shape, std::int32_t reach) {
+    const std::size_t size = values.size();
+    const auto dilate_by = [&](std::vector<float>& of, std::size_t stride) {
+        memory.resize(size);
+        if (slide(of.data(), memory.data(), size, stride, reach) != of.data()) {
+            std::swap(of, memory);
+        }
+        const auto ahead = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(reach) * stride);
+        std::copy_backward(of.begin(), of.end() - ahead, of.end());
+    };
+    rows = values;
+    dilate_by(rows, 1);  // one row after the other: their ends are not asked for
+    highest = rows;
+    dilate_by(highest, static_cast<std::size_t>(shape.stride()));
+}
+
+constexpr std::int32_t kReachMax = 6;  ///< columns: a world file asks for no more
+
+/// Distances to columns so far away along x and z.
+struct Distances {
+    float of[kReachMax + 1][kReachMax + 1];
+
+    Distances() {
+        for (std::int32_t z = 0; z <= kReachMax; ++z) {
+            for (std::int32_t x = 0; x <= kReachMax; ++x) {
+                of[z][x] = std::sqrt(static_cast<float>(x * x + z * z));
+            }
+        }
+    }
+};
 
 /// The nearest lip of a layer's top at `raw_top` around a column, as a share of what that lip
 /// reaches; 1 if there is none so near. Rows and columns from the middle outwards, as far as they
@@ -55,13 +87,11 @@ struct LipSearch {
     std::ptrdiff_t stride;
     std::int32_t reach;
     float farthest;
+    Distances distances = {};
 
     float nearest(std::ptrdiff_t center, float raw_top) const {
         float e = 1;
-        for (std::int32_t dz = 0; dz <= reach; ++dz) {
-            if (static_cast<float>(dz) / farthest >= e) {
-                break;
-            }
+        for (std::int32_t dz = 0; dz <= reach && static_cast<float>(dz) < e * farthest; ++dz) {
             e = nearest_in_row(e, center, dz, raw_top);
             if (dz > 0) {
                 e = nearest_in_row(e, center, -dz, raw_top);
@@ -76,14 +106,12 @@ struct LipSearch {
         if (row_highest[row] < raw_top) {
             return e;
         }
-        for (std::int32_t dx = 0; dx <= reach; ++dx) {
-            const float distance = std::sqrt(static_cast<float>(dx * dx + dz * dz));
-            if (distance / farthest >= e) {
-                break;
-            }
+        const float* const distance = distances.of[dz < 0 ? -dz : dz];
+        for (std::int32_t dx = 0; dx <= reach && distance[dx] < e * farthest; ++dx) {
             for (const std::ptrdiff_t j : {row - dx, row + dx}) {
-                if (over[j] >= raw_top && std::abs(moved[j] - moved[center]) <= 0.4F * distance) {
-                    e = std::min(e, distance / reaches[j]);
+                if (over[j] >= raw_top &&
+                    std::abs(moved[j] - moved[center]) <= 0.4F * distance[dx]) {
+                    e = std::min(e, distance[dx] / reaches[j]);
                 }
             }
         }
@@ -106,75 +134,89 @@ OverhangConstants::OverhangConstants(const WorldDefinition& definition,
 }
 
 /// A ledge leans out where its top is above the column's own raw height, but not above every lip.
-void OverhangField::find_ledges(const OverhangConstants& constants,
+/// Whether any does.
+bool OverhangField::find_ledges(const OverhangConstants& constants,
                                 const ResistanceConstants& resistance, const OverhangInput& input,
-                                const RectangleShape& shape, const LayerHeights& layers) {
+                                Region& region, const TerrainConstants& terrain,
+                                const RowKernels& kernels) {
     const RectangleShape& field = input.field;
+    const RectangleShape& shape = region.shape;
+    const std::size_t plane = region.plane_size();
     const auto margin_x = static_cast<std::int32_t>(shape.x0 - field.x0);
     const auto margin_z = static_cast<std::int32_t>(shape.z0 - field.z0);
-    raw_tops_.resize(constants.ledges.size() * layers.plane);
+    raw_tops_.resize(constants.ledges.size() * plane);
+    raw_top_.assign(plane, 0);
     lean_.assign(shape.padded_size(), 0);
-    for (std::int32_t z = 0; z < shape.length; ++z) {
-        const auto first = static_cast<std::size_t>(z * shape.stride());
-        const auto center = static_cast<std::size_t>((z + margin_z) * field.stride() + margin_x);
-        std::array<float, kRectangleSideMax> raw_top{};
-        std::uint32_t* __restrict const lean = lean_.data() + first;
-        const float* const highest = highest_.data() + center;
-        const float* const raw = input.raw + center;
-        const float* const moved = input.moved + center;
-        std::size_t k = 0;
-        for (std::size_t l = 0; l < constants.ledges.size(); ++l) {
-            const std::size_t ledge = constants.ledges[l];
-            const float* top = layers.first + k * layers.plane + first;
-            for (; k <= ledge; ++k, top += layers.plane) {
-                const float cost = resistance.layers[k].cost;
-                float* __restrict const to = raw_top.data();
-                for (std::int32_t x = 0; x < shape.width; ++x) {
-                    const float thickness = k > 0 ? top[x] - (top - layers.plane)[x] : top[x];
-                    to[x] += thickness * cost;
-                }
+    std::uint32_t any = 0;
+    std::size_t k = 0;
+    for (std::size_t l = 0; l < constants.ledges.size(); ++l) {
+        const std::size_t ledge = constants.ledges[l];
+        for (; k <= ledge; ++k) {
+            if (k == region.layers_built) {
+                build_layer(region, terrain, kernels);
             }
-            top -= layers.plane;
-            std::uint32_t any = 0;
-            for (std::int32_t x = 0; x < shape.width; ++x) {
-                const float thickness = top[x] - (top - layers.plane)[x];
-                const bool leans = raw_top[static_cast<std::size_t>(x)] > raw[x] - moved[x] &&
-                                   raw_top[static_cast<std::size_t>(x)] <= highest[x] &&
-                                   thickness > kThickLeast;
-                const std::uint32_t bit = leans ? std::uint32_t{1} << l : 0;
-                lean[x] |= bit;
-                any |= bit;
-            }
-            if (any != 0) {
-                std::copy_n(raw_top.data(), shape.width,
-                            raw_tops_.data() + l * layers.plane + first);
-            }
+            const float* const top = region.heights.data() + k * plane;
+            kernels.raise_tops(raw_top_.data(), k == 0 ? nullptr : top - plane, top,
+                               resistance.layers[k].cost, static_cast<std::int32_t>(plane));
+        }
+        const float* const top = region.heights.data() + ledge * plane;
+        std::uint32_t any_here = 0;
+        std::uint32_t any_later = 0;  // some lip is higher: layers above may lean out
+        for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
+            const auto first = static_cast<std::size_t>(z * shape.stride());
+            const auto center =
+                static_cast<std::size_t>((z + margin_z) * field.stride() + margin_x);
+            const LedgeSeen seen = kernels.ledge({.lean = lean_.data() + first + 1,
+                                                  .highest = highest_.data() + center + 1,
+                                                  .raw = input.raw + center + 1,
+                                                  .moved = input.moved + center + 1,
+                                                  .raw_top = raw_top_.data() + first + 1,
+                                                  .top = top + first + 1,
+                                                  .bottom = top - plane + first + 1,
+                                                  .bit = std::uint32_t{1} << l,
+                                                  .thick_least = kThickLeast,
+                                                  .count = shape.width - 2});
+            any_here |= seen.leans;
+            any_later |= seen.is_lower;
+        }
+        if (any_here != 0) {
+            std::copy_n(raw_top_.data(), plane, raw_tops_.data() + l * plane);
+        }
+        any |= any_here;
+        if (any_later == 0) {
+            break;
         }
     }
+    return any != 0;
 }
 
 void OverhangField::build(const OverhangConstants& constants, const ResistanceConstants& resistance,
-                          const OverhangInput& input, const RectangleShape& shape,
-                          const LayerHeights& layers, const float* ground,
+                          const OverhangInput& input, Region& region,
+                          const TerrainConstants& terrain, const float* ground,
                           const RowKernels& kernels, NoiseBuffers& buffers) {
+    const RectangleShape& shape = region.shape;
     overhangs_.clear();
     if (constants.reach == 0 || constants.ledges.empty() || shape.step != 1) {
         return;
     }
     const RectangleShape& field = input.field;
     const std::size_t size = field.padded_size();
-    reach_.resize(size);
     over_.resize(size);
-    noise_rectangle(reach_.data(), constants.noise, field, kernels, buffers);
-    const auto most = static_cast<float>(constants.reach);
     for (std::size_t i = 0; i < size; ++i) {
-        reach_[i] = most * clamp01(0.6F + 1.6F * reach_[i]) + 0.5F;
         // A column that can be no lip is as if it had no rock.
         over_[i] = input.crest[i] >= 0.27F && input.fine[i] >= -1.0F ? input.raw[i] - input.moved[i]
                                                                      : kNothing;
     }
-    dilate(highest_, row_highest_, over_, field, constants.reach);
-    find_ledges(constants, resistance, input, shape, layers);
+    dilate(highest_, row_highest_, reach_, over_, field, constants.reach);
+    if (!find_ledges(constants, resistance, input, region, terrain, kernels)) {
+        return;
+    }
+    reach_.resize(size);
+    noise_rectangle(reach_.data(), constants.noise, field, kernels, buffers);
+    const auto most = static_cast<float>(constants.reach);
+    for (std::size_t i = 0; i < size; ++i) {
+        reach_[i] = most * clamp01(0.6F + 1.6F * reach_[i]) + 0.5F;
+    }
     const LipSearch lips{.over = over_.data(),
                          .row_highest = row_highest_.data(),
                          .moved = input.moved,
@@ -182,25 +224,24 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
                          .stride = field.stride(),
                          .reach = constants.reach,
                          .farthest = most + 0.5F};
+    const LayerHeights layers{.first = region.heights.data(), .plane = region.plane_size()};
     overhangs_.assign(shape.padded_size(), {});
     const auto margin_x = static_cast<std::int32_t>(shape.x0 - field.x0);
     const auto margin_z = static_cast<std::int32_t>(shape.z0 - field.z0);
-    for (std::int32_t z = 0; z < shape.length; ++z) {
-        for (std::int32_t x = 0; x < shape.width; ++x) {
+    for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
+        for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
             const auto i = static_cast<std::size_t>(z * shape.stride() + x);
             const auto center =
                 static_cast<std::size_t>((z + margin_z) * field.stride() + x + margin_x);
-            if (lean_[i] == 0) {
-                continue;
-            }
-            for (std::size_t l = 0; l < constants.ledges.size(); ++l) {
-                if ((lean_[i] >> l & 1U) == 0) {
-                    continue;
-                }
+            for (std::uint32_t leans = lean_[i]; leans != 0; leans &= leans - 1) {
+                const auto l = static_cast<std::size_t>(std::countr_zero(leans));
                 const std::size_t ledge = constants.ledges[l];
                 const float raw_top = raw_tops_[l * layers.plane + i];
                 const float* const top = layers.first + ledge * layers.plane + i;
                 const float thickness = *top - *(top - layers.plane);
+                if (*top + input.moved[center] <= ground[i] + kGapLeast) {
+                    continue;  // no lip of it would be high enough
+                }
                 const float e = lips.nearest(static_cast<std::ptrdiff_t>(center), raw_top);
                 const float lip = *top + input.moved[center] - 1.5F * e;
                 const float bottom = lip - (0.45F * thickness * (1.0F - e * e) + 1.2F);

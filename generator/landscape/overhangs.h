@@ -14,6 +14,7 @@
 
 #include "generator/landscape/resistance.h"
 #include "generator/terrain/noise.h"
+#include "generator/terrain/region.h"
 #include "generator/world/world_definition.h"
 
 #include <cstdint>
@@ -47,26 +48,38 @@ struct Overhang {
 
 class OverhangField {
   public:
-    /// Finds the overhangs of a shape `margin` columns inside input.field; `layers` and `ground`
-    /// are that shape's.
+    /// Finds the overhangs of a region, but for its outermost columns. Layers that can lean out are
+    /// built if they are not there. `ground` is of the region's shape.
     void build(const OverhangConstants& constants, const ResistanceConstants& resistance,
-               const OverhangInput& input, const RectangleShape& shape, const LayerHeights& layers,
+               const OverhangInput& input, Region& region, const TerrainConstants& terrain,
                const float* ground, const RowKernels& kernels, NoiseBuffers& buffers);
+
+    void clear() { overhangs_.clear(); }
 
     const Overhang* at(std::size_t i) const {
         return overhangs_.empty() || overhangs_[i].layer < 0 ? nullptr : &overhangs_[i];
     }
 
+    template <typename Use>
+    void for_each(Use use) const {
+        for (const Overhang& one : overhangs_) {
+            if (one.layer >= 0) {
+                use(one);
+            }
+        }
+    }
+
   private:
-    void find_ledges(const OverhangConstants& constants, const ResistanceConstants& resistance,
-                     const OverhangInput& input, const RectangleShape& shape,
-                     const LayerHeights& layers);
+    bool find_ledges(const OverhangConstants& constants, const ResistanceConstants& resistance,
+                     const OverhangInput& input, Region& region, const TerrainConstants& terrain,
+                     const RowKernels& kernels);
 
     std::vector<Overhang> overhangs_;
     std::vector<float> over_;
     std::vector<float> reach_;
     std::vector<float> highest_;
     std::vector<float> row_highest_;
+    std::vector<float> raw_top_;       ///< raw height of the layers so far
     std::vector<float> raw_tops_;      ///< planes: raw height of each ledge's top
     std::vector<std::uint32_t> lean_;  ///< bit l: ledge l may lean out over the column
 };

@@ -11,9 +11,29 @@
 namespace terrane {
 namespace {
 
-constexpr std::size_t kValues = 4;      ///< of a lattice point: g, hr, pf, vm
-constexpr std::size_t kTilePoints = 4;  ///< a tile's side, in lattice points
-static_assert(kTilePoints * kTilePoints == kVectorPad);
+constexpr std::int64_t kSmoothSteps = 4;  ///< a valley is so many steps wide where it is smoothed
+constexpr std::size_t kTilesTogether = 2;
+constexpr std::size_t kValues = 6;  ///< of a lattice point: g, hr, pf, vm, and how it is moved
+
+/// So many lattice points each way are weighed together, as far as there are so many.
+struct TileSides {
+    std::size_t x = 4;
+    std::size_t z = 4;
+};
+
+/// The sides that need the fewest tiles; a tile has at most kVectorPad points.
+TileSides tile_sides(std::size_t lines_x, std::size_t lines_z) {
+    constexpr std::array<TileSides, 3> kShapes = {
+        {{.x = 4, .z = 4}, {.x = 5, .z = 3}, {.x = 3, .z = 5}}};
+    const auto tiles = [&](const TileSides& sides) {
+        return ((lines_x + sides.x - 1) / sides.x) * ((lines_z + sides.z - 1) / sides.z);
+    };
+    TileSides best = kShapes[0];
+    for (const TileSides& sides : kShapes) {
+        best = tiles(sides) < tiles(best) ? sides : best;
+    }
+    return best;
+}
 
 /// Weights of the four lattice points around a place, and their slopes a column.
 struct Taps {
@@ -35,38 +55,35 @@ Taps taps_at(std::int64_t eighths) {
 
 using AllTaps = std::array<Taps, kLatticeStep>;
 
-/// A row of columns next to each other, from values of its lattice columns, `lines` a plane: cell
-/// by cell, in which the four points are the same.
-void mix_columns(const std::array<float*, kValues + 1>& to, float* slope_x, const float* mixed,
-                 std::size_t lines, const AllTaps& taps, std::int32_t first_eighth,
-                 std::int32_t width) {
-    constexpr auto kStep = static_cast<std::int32_t>(kLatticeStep);
-    std::array<std::array<float, kLatticeStep>, 4> weight;
-    std::array<std::array<float, kLatticeStep>, 4> slope;
+static_assert(kSplineCell == kLatticeStep);
+
+/// Shares of values, then of their slopes.
+std::array<SplineShares, 2> shares_of(const AllTaps& taps) {
+    std::array<SplineShares, 2> shares;
     for (std::size_t p = 0; p < 4; ++p) {
         for (std::size_t e = 0; e < kLatticeStep; ++e) {
-            weight[p][e] = taps[e].weight[p];
-            slope[p][e] = taps[e].slope[p];
+            shares[0].of[p][e] = taps[e].weight[p];
+            shares[1].of[p][e] = taps[e].slope[p];
         }
     }
-    const auto mix_cell = [](float* out, const float* value, const auto& share, std::int32_t from,
-                             std::int32_t count) {
-        std::array<float, kLatticeStep> sum;
-        for (std::size_t e = 0; e < kLatticeStep; ++e) {
-            sum[e] = share[0][e] * value[0] + share[1][e] * value[1] + share[2][e] * value[2] +
-                     share[3][e] * value[3];
-        }
-        std::copy_n(sum.data() + from, count, out);
-    };
-    std::int32_t from = first_eighth;
-    for (std::int32_t column = 0; column < width; ++mixed) {
-        const std::int32_t count = std::min(kStep - from, width - column);
-        for (std::size_t v = 0; v <= kValues; ++v) {
-            mix_cell(to[v] + column, mixed + v * lines, weight, from, count);
-        }
-        mix_cell(slope_x + column, mixed, slope, from, count);
-        column += count;
-        from = 0;
+    return shares;
+}
+
+/// A row of columns next to each other, from the values of its lattice columns: cell by cell, in
+/// which the four points are the same. A last cell that is cut runs over into columns that come
+/// later.
+void mix_columns(float* out, const float* values, const SplineShares& shares,
+                 std::int32_t first_eighth, std::int32_t width, const RowKernels& kernels) {
+    std::int32_t column = 0;
+    if (first_eighth > 0) {
+        std::array<float, kSplineCell> cell;
+        kernels.mix_cells(cell.data(), values++, shares, 1);
+        column = kSplineCell - first_eighth;
+        std::copy(cell.begin() + first_eighth, cell.end(), out);
+    }
+    if (column < width) {
+        kernels.mix_cells(out + column, values, shares,
+                          (width - column + kSplineCell - 1) / kSplineCell);
     }
 }
 
@@ -87,6 +104,11 @@ MovedPlace moved(std::int64_t x, std::int64_t z, float by_x, float by_z) {
             .z_rest = by_z - whole_z};
 }
 
+/// What lies between two intervals.
+float gap(float low, float high, float other_low, float other_high) {
+    return std::max(0.0F, std::max(low - other_high, other_low - high));
+}
+
 float mountain_of(float noise) {
     return 0.1F + 0.9F * smooth_step(-0.2F, 0.3F, noise);
 }
@@ -98,13 +120,20 @@ struct ReliefBuilder::Axis {
     std::vector<std::int64_t> lines;   ///< columns of the lattice's lines, ascending
     std::vector<std::int32_t> first;   ///< per column: entry of its first point
     std::vector<std::uint8_t> eighth;  ///< per column: how far behind its second point
-    std::size_t points = 4;            ///< of which a column's value is made
+    std::size_t points = 4;            ///< of which a column's value is made: 1, 3 or 4
 
     std::size_t stride() const {
         return static_cast<std::size_t>(padded_width(static_cast<std::int32_t>(lines.size())));
     }
 
-    Axis(std::int64_t start, std::int32_t count, std::int64_t step) {
+    Axis(std::int64_t start, std::int32_t count, std::int64_t step, bool is_smooth) {
+        if (!is_smooth) {
+            points = 1;
+            for (std::int32_t i = 0; i < count; ++i) {
+                lines.push_back(floor_div(start + i * step, kLatticeStep) * kLatticeStep);
+            }
+            return;
+        }
         // Right on a line the fourth point weighs nothing.
         points = start % kLatticeStep == 0 && step % kLatticeStep == 0 ? 3 : 4;
         std::int64_t newest = 0;
@@ -147,79 +176,103 @@ void ReliefBuilder::find_rivers(const RiverConstants& constants, const Rectangle
     rivers_.build(constants, {.first_i = i0, .last_i = i1, .first_j = j0, .last_j = j1});
 }
 
-void ReliefBuilder::fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                              std::size_t first_x, std::size_t first_z, const RowKernels& kernels) {
+/// Up to kTilesTogether x kTilesTogether tiles: near reaches are looked for once for all of them.
+void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                               const LatticeTile& first, const RowKernels& kernels) {
     const RiverConstants& rivers = constants.rivers;
     const std::size_t stride = x.stride();
     const std::size_t plane = stride * z.lines.size() + kVectorPad;
-    const float* const wander_x = lattice_.data() + kValues * plane;
+    const float* const wander_x = lattice_.data() + 4 * plane;
     const float* const wander_z = wander_x + plane;
-    const std::int64_t origin_x = x.lines[first_x];
-    const std::int64_t origin_z = z.lines[first_z];
-    ValleyPlaces places;
-    std::array<MovedPlace, kVectorPad> moved_to;
-    std::array<std::size_t, kVectorPad> at;
+    const std::int64_t origin_x = x.lines[first.first_x];
+    const std::int64_t origin_z = z.lines[first.first_z];
+
+    struct Tile {
+        ValleyPlaces places;
+        std::array<MovedPlace, kVectorPad> moved_to;
+        std::array<std::size_t, kVectorPad> at;
+    };
+
+    std::array<Tile, kTilesTogether * kTilesTogether> tiles;
+    std::size_t tile_count = 0;
     std::int64_t x_min = INT64_MAX;
     std::int64_t x_max = INT64_MIN;
     std::int64_t z_min = INT64_MAX;
     std::int64_t z_max = INT64_MIN;
-    for (std::size_t n = 0; n < kVectorPad; ++n) {
-        // Beyond the lattice's end, its last points once more.
-        const std::size_t line_x = std::min(first_x + n % kTilePoints, x.lines.size() - 1);
-        const std::size_t line_z = std::min(first_z + n / kTilePoints, z.lines.size() - 1);
-        at[n] = line_z * stride + line_x;
-        moved_to[n] = moved(x.lines[line_x], z.lines[line_z], rivers.wander * wander_x[at[n]],
-                            rivers.wander * wander_z[at[n]]);
-        const MovedPlace& place = moved_to[n];
-        places.x[n] = static_cast<float>(place.x - origin_x);
-        places.z[n] = static_cast<float>(place.z - origin_z);
-        places.x_rest[n] = place.x_rest;
-        places.z_rest[n] = place.z_rest;
-        x_min = std::min(x_min, place.x);
-        x_max = std::max(x_max, place.x + 1);
-        z_min = std::min(z_min, place.z);
-        z_max = std::max(z_max, place.z + 1);
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+        const std::size_t tile_x = first.first_x + t % kTilesTogether * first.width;
+        const std::size_t tile_z = first.first_z + t / kTilesTogether * first.length;
+        if (tile_x >= x.lines.size() || tile_z >= z.lines.size()) {
+            continue;
+        }
+        Tile& tile = tiles[tile_count++];
+        for (std::size_t n = 0; n < kVectorPad; ++n) {
+            // Beyond the tile's or the lattice's end, the last points once more.
+            const std::size_t row = std::min(n / first.width, first.length - 1);
+            const std::size_t line_x = std::min(tile_x + n % first.width, x.lines.size() - 1);
+            const std::size_t line_z = std::min(tile_z + row, z.lines.size() - 1);
+            tile.at[n] = line_z * stride + line_x;
+            tile.moved_to[n] =
+                moved(x.lines[line_x], z.lines[line_z], wander_x[tile.at[n]], wander_z[tile.at[n]]);
+            const MovedPlace& place = tile.moved_to[n];
+            tile.places.x[n] = static_cast<float>(place.x - origin_x);
+            tile.places.z[n] = static_cast<float>(place.z - origin_z);
+            tile.places.x_rest[n] = place.x_rest;
+            tile.places.z_rest[n] = place.z_rest;
+            x_min = std::min(x_min, place.x);
+            x_max = std::max(x_max, place.x + 1);
+            z_min = std::min(z_min, place.z);
+            z_max = std::max(z_max, place.z + 1);
+        }
     }
     const float reach = 1.1F * constants.valley;
     const float slack = reach + 1.0F;  // far above rounding errors: what is left out weighs 0
-    const Reach& first = rivers_.reaches().front();
+    const Reach& reference = rivers_.reaches().front();
     near_.clear();
     rivers_.for_each_meeting({.first_i = rivers.cell_of(x_min, 1) - kRiverReachCells,
                               .last_i = rivers.cell_of(x_max, 0) + kRiverReachCells,
                               .first_j = rivers.row_of(z_min) - kRiverReachCells,
                               .last_j = rivers.row_of(z_max) + kRiverReachCells},
-                             {.x_min = static_cast<float>(x_min - first.x) - slack,
-                              .x_max = static_cast<float>(x_max - first.x) + slack,
-                              .z_min = static_cast<float>(z_min - first.z) - slack,
-                              .z_max = static_cast<float>(z_max - first.z) + slack},
+                             {.x_min = static_cast<float>(x_min - reference.x) - slack,
+                              .x_max = static_cast<float>(x_max - reference.x) + slack,
+                              .z_min = static_cast<float>(z_min - reference.z) - slack,
+                              .z_max = static_cast<float>(z_max - reference.z) + slack},
                              [&](const Reach& one) {
-                                 ReachShape& shape = near_.emplace_back();
-                                 shape.x = static_cast<float>(one.x - origin_x);
-                                 shape.z = static_cast<float>(one.z - origin_z);
-                                 std::copy(one.px.begin(), one.px.end(), shape.px);
-                                 std::copy(one.pz.begin(), one.pz.end(), shape.pz);
-                                 std::copy(one.inverse_square.begin(), one.inverse_square.end(),
-                                           shape.inverse_square);
-                                 shape.level = one.level;
-                                 shape.level_change = one.level_change;
+                                 const auto x_of = static_cast<float>(one.x - origin_x);
+                                 const auto z_of = static_cast<float>(one.z - origin_z);
+                                 const float gap_x = gap(x_of + one.x_min, x_of + one.x_max,
+                                                         static_cast<float>(x_min - origin_x),
+                                                         static_cast<float>(x_max - origin_x));
+                                 const float gap_z = gap(z_of + one.z_min, z_of + one.z_max,
+                                                         static_cast<float>(z_min - origin_z),
+                                                         static_cast<float>(z_max - origin_z));
+                                 if (gap_x * gap_x + gap_z * gap_z < slack * slack) {
+                                     ReachShape& shape = near_.emplace_back(shape_of_reach(one));
+                                     shape.x = x_of;
+                                     shape.z = z_of;
+                                 }
                              });
-    kernels.valleys(places, near_.data(), static_cast<std::int32_t>(near_.size()),
-                    {.inverse_reach_square = 1.0F / (reach * reach),
-                     .e2 = 0.0025F * constants.valley * constants.valley,
-                     .half_valley = 0.5F * constants.valley,
-                     .plateau = constants.plateau});
-    for (std::size_t n = 0; n < kVectorPad; ++n) {
-        float* const value = lattice_.data() + at[n];
-        value[plane] = places.weight[n] > 0 ? places.river[n]
-                                            : rivers.potential_at(moved_to[n].x, moved_to[n].z);
-        value[2 * plane] = places.crest[n];
+    for (std::size_t t = 0; t < tile_count; ++t) {
+        Tile& tile = tiles[t];
+        kernels.valleys(tile.places, near_.data(), static_cast<std::int32_t>(near_.size()),
+                        {.inverse_reach_square = 1.0F / (reach * reach),
+                         .e2 = 0.0025F * constants.valley * constants.valley,
+                         .half_valley = 0.5F * constants.valley,
+                         .plateau = constants.plateau});
+        for (std::size_t n = 0; n < kVectorPad; ++n) {
+            float* const value = lattice_.data() + tile.at[n];
+            value[plane] = tile.places.weight[n] > 0
+                               ? tile.places.river[n]
+                               : rivers.potential_at(tile.moved_to[n].x, tile.moved_to[n].z);
+            value[2 * plane] = tile.places.crest[n];
+        }
     }
 }
 
 void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                                  const RowKernels& kernels, NoiseBuffers& buffers) {
     const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
-    lattice_.resize(std::max(lattice_.size(), plane * (kValues + 2)));
+    lattice_.resize(std::max(lattice_.size(), plane * kValues));
     float* const ground = lattice_.data();
     float* const river = ground + plane;
     float* const crest = river + plane;
@@ -227,9 +280,15 @@ void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x
     noise_grid(mountain, constants.mountains, x.lines, z.lines, kernels, buffers);
     noise_grid(mountain + plane, constants.rivers.wander_x, x.lines, z.lines, kernels, buffers);
     noise_grid(mountain + 2 * plane, constants.rivers.wander_z, x.lines, z.lines, kernels, buffers);
-    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += kTilePoints) {
-        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += kTilePoints) {
-            fill_tile(constants, x, z, line_x, line_z, kernels);
+    for (float* value = mountain + plane; value < mountain + 3 * plane; ++value) {
+        *value *= constants.rivers.wander;
+    }
+    const TileSides sides = tile_sides(x.lines.size(), z.lines.size());
+    for (std::size_t line_z = 0; line_z < z.lines.size(); line_z += kTilesTogether * sides.z) {
+        for (std::size_t line_x = 0; line_x < x.lines.size(); line_x += kTilesTogether * sides.x) {
+            fill_tiles(constants, x, z,
+                       {.first_x = line_x, .first_z = line_z, .width = sides.x, .length = sides.z},
+                       kernels);
         }
     }
     for (std::size_t line_z = 0; line_z < z.lines.size(); ++line_z) {
@@ -248,8 +307,7 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
                                        &out.slope_x, &out.slope_z, &out.wander_x, &out.wander_z}) {
         raster->resize(size);
     }
-    out.has_rivers = shape.step <= constants.rivers.cell_x;
-    if (!out.has_rivers) {
+    if (shape.step > constants.rivers.cell_x) {
         // Half way between a river and a crest, without their shapes.
         constexpr float kMeanCrest = 0.5F;
         noise_rectangle(out.mountain.data(), constants.mountains, shape, kernels, buffers);
@@ -260,19 +318,34 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             out.crest[i] = kMeanCrest;
             out.ground[i] = out.river[i] + constants.height * out.mountain[i] * kMeanCrest;
         }
+        out.is_smooth = false;
         std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
         std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
         return;
     }
     find_rivers(constants.rivers, shape);
-    const Axis x(shape.x0, shape.width, shape.step);
-    const Axis z(shape.z0, shape.length, shape.step);
+    out.is_smooth = shape.step <= constants.rivers.cell_x / kSmoothSteps;
+    const Axis x(shape.x0, shape.width, shape.step, out.is_smooth);
+    const Axis z(shape.z0, shape.length, shape.step, out.is_smooth);
     fill_lattice(constants, x, z, kernels, buffers);
+    if (!out.is_smooth) {
+        // Lattice and columns are one, row by row of the same stride.
+        const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
+        const std::array<std::vector<float>*, kValues> to = {
+            &out.ground, &out.river, &out.crest, &out.mountain, &out.wander_x, &out.wander_z};
+        for (std::size_t v = 0; v < kValues; ++v) {
+            std::copy_n(lattice_.data() + v * plane, size, to[v]->begin());
+        }
+        std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
+        std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
+        return;
+    }
     AllTaps taps;
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
-    // Rows of the lattice first, mixed along z: five values a lattice column, g's slope along z
+    const std::array<SplineShares, 2> shares = shares_of(taps);
+    // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z
     // too.
     const std::size_t lines = x.stride();
     const std::size_t plane = lines * z.lines.size() + kVectorPad;
@@ -299,11 +372,17 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
         }
         const auto first = static_cast<std::size_t>(row * shape.stride());
         const std::array<float*, kValues + 1> to = {
-            out.ground.data() + first, out.river.data() + first, out.crest.data() + first,
-            out.mountain.data() + first, out.slope_z.data() + first};
+            out.ground.data() + first,   out.river.data() + first,    out.crest.data() + first,
+            out.mountain.data() + first, out.wander_x.data() + first, out.wander_z.data() + first,
+            out.slope_z.data() + first};
         if (shape.step == 1) {
-            mix_columns(to, out.slope_x.data() + first, mixed_.data(), lines, taps,
-                        x.eighth.front(), shape.width);
+            const std::int32_t eighth = x.eighth.front();
+            for (std::size_t v = 0; v <= kValues; ++v) {
+                mix_columns(to[v], mixed_.data() + v * lines, shares[0], eighth, shape.width,
+                            kernels);
+            }
+            mix_columns(out.slope_x.data() + first, mixed_.data(), shares[1], eighth, shape.width,
+                        kernels);
             continue;
         }
         for (std::int32_t column = 0; column < shape.width; ++column) {
@@ -322,12 +401,6 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             }
             out.slope_x[first + static_cast<std::size_t>(column)] = sum[kValues + 1];
         }
-    }
-    noise_rectangle(out.wander_x.data(), constants.rivers.wander_x, shape, kernels, buffers);
-    noise_rectangle(out.wander_z.data(), constants.rivers.wander_z, shape, kernels, buffers);
-    for (std::size_t i = 0; i < size; ++i) {
-        out.wander_x[i] *= constants.rivers.wander;
-        out.wander_z[i] *= constants.rivers.wander;
     }
 }
 

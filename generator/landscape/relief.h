@@ -11,9 +11,11 @@
 //
 // The sum is a smooth minimum of distances, so that valleys meet in crests (Genevaux et al. 2013)
 // without sorting or a pass over the map. Only reaches of nodes at most kRiverReachCells away come
-// so near; 4 x 4 points of the lattice at a time look at those whose boxes come near one of them.
-// Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient. Levels whose step
-// exceeds the valley take the mean between river and crest.
+// so near; some 4 x 4 points of the lattice at a time look at those whose boxes come near one of
+// them. Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient; so do they take
+// how far a place is moved before a river is sought. Levels whose step exceeds a quarter of the
+// valley take the value of one point; levels whose step exceeds the valley take the mean between
+// river and crest.
 #pragma once
 
 #include "generator/landscape/river_graph.h"
@@ -48,7 +50,7 @@ struct ReliefRasters {
     std::vector<float> slope_z;
     std::vector<float> wander_x;  ///< columns by which the place is moved before a river is sought
     std::vector<float> wander_z;
-    bool has_rivers = false;  ///< false at levels that are too coarse for them
+    bool is_smooth = false;  ///< false at coarse levels: there are no slopes, and no channels
 };
 
 /// Builds relief for one worker; keeps its rivers and buffers.
@@ -62,15 +64,23 @@ class ReliefBuilder {
   private:
     struct Axis;
 
+    /// Points of the lattice that are weighed together.
+    struct LatticeTile {
+        std::size_t first_x = 0;
+        std::size_t first_z = 0;
+        std::size_t width = 0;
+        std::size_t length = 0;
+    };
+
     void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
     void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                       const RowKernels& kernels, NoiseBuffers& buffers);
-    void fill_tile(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                   std::size_t first_x, std::size_t first_z, const RowKernels& kernels);
+    void fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                    const LatticeTile& first, const RowKernels& kernels);
 
     RiverGraph rivers_;
     std::vector<float> lattice_;    ///< planes of g, hr, pf, vm and how a place is moved in x and z
-    std::vector<ReachShape> near_;  ///< of one tile of the lattice
+    std::vector<ReachShape> near_;  ///< of some tiles of the lattice
     std::vector<float> mixed_;      ///< one row of the lattice, mixed along z
 };
 

@@ -27,28 +27,17 @@ ResistanceConstants::ResistanceConstants(const WorldDefinition& definition,
     }
 }
 
-void resist(float* height, float* rest, const float* over, const ResistanceConstants& constants,
-            const LayerHeights& layers, std::size_t count) {
+ResistanceWalk::ResistanceWalk(float* height, float* rest, const float* over, std::size_t count)
+    : height_(height), rest_(rest), count_(count) {
     std::fill_n(height, count, 0.0F);
     std::copy_n(over, count, rest);
-    for (std::size_t k = 0; k < constants.layers.size(); ++k) {
-        const LayerResistance layer = constants.layers[k];
-        const float* const top = layers.first + k * layers.plane;
-        const float* const bottom = k > 0 ? top - layers.plane : nullptr;
-        std::int32_t is_left = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            const float thickness = bottom != nullptr ? top[i] - bottom[i] : top[i];
-            const float limit = thickness * layer.cost;
-            const float m = std::max(0.0F, std::min(rest[i], limit));
-            height[i] += m * m * (1.0F + layer.concave) / (m + layer.concave * limit + 1e-9F) *
-                         layer.inverse_cost;
-            rest[i] -= limit;
-            is_left |= static_cast<std::int32_t>(rest[i] > 0);
-        }
-        if (is_left == 0) {
-            break;  // higher layers would add 0
-        }
-    }
+}
+
+bool ResistanceWalk::pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k,
+                          const RowKernels& kernels) {
+    const float* const top = layers.first + k * layers.plane;
+    return kernels.resist(height_, rest_, k > 0 ? top - layers.plane : nullptr, top, layer,
+                          static_cast<std::int32_t>(count_));
 }
 
 }  // namespace terrane

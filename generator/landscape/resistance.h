@@ -14,6 +14,7 @@
 // Where raw passes the top of the stack, the stack's own top remains: a mesa.
 #pragma once
 
+#include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/layer_stack.h"
 #include "generator/terrain/noise.h"
 #include "generator/world/world_definition.h"
@@ -22,13 +23,6 @@
 #include <vector>
 
 namespace terrane {
-
-struct LayerResistance {
-    float cost = 1;  ///< g: raw height of a voxel
-    float inverse_cost = 1;
-    float resistance = 1;  ///< rho
-    float concave = 0;     ///< e
-};
 
 struct ResistanceConstants {
     std::vector<LayerResistance> layers;
@@ -42,9 +36,22 @@ struct LayerHeights {
     std::size_t plane = 0;
 };
 
-/// height[i] = y of each value: where raw height `over[i]` above the bottom of the stack ends.
-/// `rest` is memory of as many values.
-void resist(float* height, float* rest, const float* over, const ResistanceConstants& constants,
-            const LayerHeights& layers, std::size_t count);
+/// Goes up through layer after layer, each of which must be there only when it is asked for.
+class ResistanceWalk {
+  public:
+    /// height[i] becomes y of each value: where raw height over[i] above the bottom of the stack
+    /// ends. `rest` is memory of as many values, whole blocks of them.
+    ResistanceWalk(float* height, float* rest, const float* over, std::size_t count);
+
+    /// Layer `k`, once it and those below it are there; from 0 on, each once. Whether some value is
+    /// left: else higher layers would add nothing.
+    bool pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k,
+              const RowKernels& kernels);
+
+  private:
+    float* height_;
+    float* rest_;
+    std::size_t count_;
+};
 
 }  // namespace terrane

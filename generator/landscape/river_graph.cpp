@@ -7,20 +7,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace terrane {
 namespace {
 
 constexpr std::int8_t kSink = -1;
-
-struct Node {
-    std::uint64_t hash = 0;
-    std::int64_t x = 0;
-    std::int64_t z = 0;
-    float level = 0;
-    float accumulated = 1;
-    std::int8_t downstream = kSink;  ///< which neighbour
-};
+constexpr std::int64_t kMargin =
+    kUpstreamSteps + 2;  ///< cells around those whose reaches are known
 
 struct Step {
     std::int64_t i = 0;
@@ -46,8 +40,8 @@ Step neighbour(std::int64_t j, int n) {
     }
 }
 
-Node make_node(const RiverConstants& constants, std::int64_t i, std::int64_t j) {
-    Node node;
+RiverNode make_node(const RiverConstants& constants, std::int64_t i, std::int64_t j) {
+    RiverNode node;
     node.hash = key(constants.seed, LandscapeTag::river_node, i, j);
     const auto inside = [](double u, std::int64_t side) {
         return static_cast<std::int64_t>((0.2 + 0.6 * u) * static_cast<double>(side));
@@ -60,7 +54,7 @@ Node make_node(const RiverConstants& constants, std::int64_t i, std::int64_t j) 
     return node;
 }
 
-void shape_reach(Reach& reach, const Node& from, const Node& to) {
+void shape_reach(Reach& reach, const RiverNode& from, const RiverNode& to) {
     const auto ex = static_cast<float>(to.x - from.x);
     const auto ez = static_cast<float>(to.z - from.z);
     const auto bend = 0.7F * static_cast<float>(unit_of(mix(from.hash + 3)) - 0.5);
@@ -84,20 +78,36 @@ void shape_reach(Reach& reach, const Node& from, const Node& to) {
     reach.z_max = *std::max_element(reach.pz.begin(), reach.pz.end());
 }
 
-/// A rectangle of nodes with a margin in which downstream and accumulation are still being found.
+/// Finds downstream and accumulation in a rectangle of nodes; they are known but for kMargin.
 class NodeGrid {
   public:
-    static constexpr std::int64_t kMargin = kUpstreamSteps + 2;
-
-    NodeGrid(const RiverConstants& constants, const CellRange& range)
+    /// Overwrites `nodes`; what `before` holds is not made again.
+    NodeGrid(RiverNodes& nodes, const RiverNodes& before, const RiverConstants& constants,
+             const CellRange& range)
         : first_i_(range.first_i - kMargin),
           first_j_(range.first_j - kMargin),
           width_(range.last_i - range.first_i + 1 + 2 * kMargin),
-          length_(range.last_j - range.first_j + 1 + 2 * kMargin) {
+          length_(range.last_j - range.first_j + 1 + 2 * kMargin),
+          nodes_(nodes.nodes) {
+        nodes.range = {.first_i = first_i_,
+                       .last_i = first_i_ + width_ - 1,
+                       .first_j = first_j_,
+                       .last_j = first_j_ + length_ - 1};
+        nodes_.clear();
         nodes_.reserve(static_cast<std::size_t>(width_ * length_));
-        for (std::int64_t j = 0; j < length_; ++j) {
-            for (std::int64_t i = 0; i < width_; ++i) {
-                nodes_.push_back(make_node(constants, first_i_ + i, first_j_ + j));
+        const CellRange& known = before.range;
+        const std::int64_t known_width = known.last_i - known.first_i + 1;
+        for (std::int64_t j = first_j_; j < first_j_ + length_; ++j) {
+            for (std::int64_t i = first_i_; i < first_i_ + width_; ++i) {
+                if (i < known.first_i || i > known.last_i || j < known.first_j ||
+                    j > known.last_j) {
+                    nodes_.push_back(make_node(constants, i, j));
+                    continue;
+                }
+                nodes_.push_back(before.nodes[static_cast<std::size_t>(
+                    (j - known.first_j) * known_width + (i - known.first_i))]);
+                nodes_.back().accumulated = 1;
+                nodes_.back().downstream = kSink;
             }
         }
         find_downstream();
@@ -106,11 +116,11 @@ class NodeGrid {
         }
     }
 
-    const Node& at(std::int64_t i, std::int64_t j) const {
+    const RiverNode& at(std::int64_t i, std::int64_t j) const {
         return nodes_[index(i - first_i_, j - first_j_)];
     }
 
-    const Node& downstream_of(std::int64_t i, std::int64_t j) const {
+    const RiverNode& downstream_of(std::int64_t i, std::int64_t j) const {
         const Step step = neighbour(j, at(i, j).downstream);
         return at(i + step.i, j + step.j);
     }
@@ -123,7 +133,7 @@ class NodeGrid {
     void find_downstream() {
         for (std::int64_t j = 1; j + 1 < length_; ++j) {
             for (std::int64_t i = 1; i + 1 < width_; ++i) {
-                Node& node = nodes_[index(i, j)];
+                RiverNode& node = nodes_[index(i, j)];
                 float lowest = node.level;
                 for (int n = 0; n < 6; ++n) {
                     const Step step = neighbour(first_j_ + j, n);
@@ -141,7 +151,7 @@ class NodeGrid {
         std::vector<float> next(nodes_.size(), 1.0F);
         for (std::int64_t j = 1; j + 1 < length_; ++j) {
             for (std::int64_t i = 1; i + 1 < width_; ++i) {
-                const Node& node = nodes_[index(i, j)];
+                const RiverNode& node = nodes_[index(i, j)];
                 if (node.downstream != kSink) {
                     const Step step = neighbour(first_j_ + j, node.downstream);
                     next[index(i + step.i, j + step.j)] += node.accumulated;
@@ -157,7 +167,7 @@ class NodeGrid {
     std::int64_t first_j_;
     std::int64_t width_;
     std::int64_t length_;
-    std::vector<Node> nodes_;
+    std::vector<RiverNode>& nodes_;
 };
 
 }  // namespace
@@ -190,23 +200,14 @@ std::int64_t RiverConstants::cell_of(std::int64_t x, std::int64_t j) const {
     return floor_div(x - ((j & 1) != 0 ? cell_x / 2 : 0), cell_x);
 }
 
-OnReach nearest_on(const Reach& reach, float x, float z) {
-    OnReach best{.square = 1e30F};
-    for (std::size_t p = 0; p < kReachSegments; ++p) {
-        const float ax = x - reach.px[p];
-        const float az = z - reach.pz[p];
-        const float ex = reach.px[p + 1] - reach.px[p];
-        const float ez = reach.pz[p + 1] - reach.pz[p];
-        const float t = clamp01((ax * ex + az * ez) * reach.inverse_square[p]);
-        const float qx = ax - t * ex;
-        const float qz = az - t * ez;
-        const float square = qx * qx + qz * qz;
-        if (square < best.square) {
-            best = {.square = square,
-                    .along = (static_cast<float>(p) + t) / static_cast<float>(kReachSegments)};
-        }
-    }
-    return best;
+ReachShape shape_of_reach(const Reach& reach) {
+    ReachShape shape;
+    std::copy(reach.px.begin(), reach.px.end(), shape.px);
+    std::copy(reach.pz.begin(), reach.pz.end(), shape.pz);
+    std::copy(reach.inverse_square.begin(), reach.inverse_square.end(), shape.inverse_square);
+    shape.level = reach.level;
+    shape.level_change = reach.level_change;
+    return shape;
 }
 
 void RiverGraph::build(const RiverConstants& constants, const CellRange& range) {
@@ -217,13 +218,14 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
     const std::int64_t length = range.last_j - range.first_j + 1;
     TERRANE_ASSERT(width > 0 && length > 0 &&
                    static_cast<std::size_t>(width * length) <= kNodesMax);
-    const NodeGrid nodes(constants, range);
+    std::swap(nodes_, before_);
+    const NodeGrid nodes(nodes_, before_, constants, range);
     range_ = range;
     reaches_.clear();
     boxes_.clear();
     for (std::int64_t j = range.first_j; j <= range.last_j; ++j) {
         for (std::int64_t i = range.first_i; i <= range.last_i; ++i) {
-            const Node& node = nodes.at(i, j);
+            const RiverNode& node = nodes.at(i, j);
             Reach reach;
             reach.x = node.x;
             reach.z = node.z;
@@ -231,7 +233,7 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
             reach.measure = std::sqrt(node.accumulated - 1.0F);
             reach.is_sink = node.downstream == kSink;
             if (!reach.is_sink) {
-                const Node& next = nodes.downstream_of(i, j);
+                const RiverNode& next = nodes.downstream_of(i, j);
                 reach.level_change = next.level - node.level;
                 reach.measure_change = std::sqrt(next.accumulated - 1.0F) - reach.measure;
                 shape_reach(reach, node, next);

@@ -73,13 +73,8 @@ struct Reach {
     bool is_sink = false;
 };
 
-/// The nearest point of a reach.
-struct OnReach {
-    float square = 0;  ///< of the distance, columns^2
-    float along = 0;   ///< 0 at the node, 1 at the end
-};
-
-OnReach nearest_on(const Reach& reach, float x, float z);
+/// What kernels see of a reach; the place of its node is left to the caller.
+ReachShape shape_of_reach(const Reach& reach);
 
 struct ReachBox {
     float x_min = 0;
@@ -98,7 +93,24 @@ struct CellRange {
     friend bool operator==(const CellRange&, const CellRange&) = default;
 };
 
-/// The reaches of a rectangle of cells. Kept from region to region: neighbours ask for the same.
+/// Where a cell's river passes.
+struct RiverNode {
+    std::uint64_t hash = 0;
+    std::int64_t x = 0;
+    std::int64_t z = 0;
+    float level = 0;
+    float accumulated = 1;
+    std::int8_t downstream = -1;  ///< which neighbour; -1: it is a sink
+};
+
+/// A rectangle of cells' nodes, by row.
+struct RiverNodes {
+    CellRange range;
+    std::vector<RiverNode> nodes;
+};
+
+/// The reaches of a rectangle of cells. Kept from region to region: neighbours ask for the same, or
+/// for most of the nodes.
 class RiverGraph {
   public:
     /// More are never held: a coarse region of the widest rectangle needs fewer.
@@ -135,6 +147,8 @@ class RiverGraph {
 
   private:
     CellRange range_;
+    RiverNodes nodes_;  ///< of the range and what is upstream and downstream of it
+    RiverNodes before_;
     std::vector<Reach> reaches_;
     std::vector<ReachBox> boxes_;
 };

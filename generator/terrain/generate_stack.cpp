@@ -66,17 +66,21 @@ StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
 StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
 
 Result<void> StackGenerator::build(const ColumnRectangle& rectangle) {
-    build_region(buffers_->region, *world_, buffers_->constants,
-                 buffers_->landscape ? Landscape::region_for(rectangle) : rectangle,
-                 buffers_->plots, *kernels_);
+    if (buffers_->landscape) {
+        begin_region(buffers_->region, *world_, rectangle, Landscape::kApron, buffers_->plots,
+                     *kernels_);
+        buffers_->landscape->build(buffers_->region, buffers_->constants, buffers_->plots,
+                                   *kernels_);
+    } else {
+        build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
+                     *kernels_);
+    }
     return check_elements(buffers_->region, *world_);
 }
 
-void StackGenerator::write(const ColumnWriterOutput& out, const ColumnRectangle& rectangle,
-                           std::int32_t apron) {
+void StackGenerator::write(const ColumnWriterOutput& out, std::int32_t apron) {
     if (buffers_->landscape) {
-        buffers_->landscape->write(out, buffers_->region, buffers_->constants, rectangle, apron,
-                                   *kernels_);
+        buffers_->landscape->write(out, buffers_->region, buffers_->constants, apron);
     } else {
         write_columns(out, buffers_->region, *world_, buffers_->constants, apron, *kernels_);
     }
@@ -102,9 +106,14 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
+<<<<<<< HEAD
            .element_ids = buffers_->element_ids,
            .element_limits = buffers_->element_limits},
           rectangle, 1);
+=======
+           .element_ids = buffers_->element_ids},
+          1);
+>>>>>>> land
     return {};
 }
 
@@ -118,9 +127,14 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
+<<<<<<< HEAD
            .element_ids = buffers_->element_ids,
            .element_limits = buffers_->element_limits},
           rectangle, 0);
+=======
+           .element_ids = buffers_->element_ids},
+          0);
+>>>>>>> land
     return {};
 }
 

@@ -47,7 +47,7 @@ class StackGenerator {
     struct Buffers;
 
     Result<void> build(const ColumnRectangle& rectangle);
-    void write(const ColumnWriterOutput& out, const ColumnRectangle& rectangle, std::int32_t apron);
+    void write(const ColumnWriterOutput& out, std::int32_t apron);
 
     const World* world_;
     const RowKernels* kernels_;

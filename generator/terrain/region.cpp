@@ -45,9 +45,10 @@ std::optional<PlacedElement> place(const PlottedElement& plotted, const Rectangl
     return placed;
 }
 
-/// Every element of every plot near enough, rastered; in laying order.
-void find_elements(Region& region, const World& world, PlotCache& plots,
-                   const RowKernels& kernels) {
+/// Every element of every plot near enough that `is_wanted`, rastered; in laying order.
+template <typename Wanted>
+void find_elements(Region& region, const World& world, PlotCache& plots, const RowKernels& kernels,
+                   Wanted is_wanted) {
     region.elements.clear();
     region.gap_begin.assign(world.stack.layers.size(), 0);
     const TerrainParameters& terrain = world.definition.terrain;
@@ -69,7 +70,7 @@ void find_elements(Region& region, const World& world, PlotCache& plots,
         for (std::int64_t px = first.x; px <= last.x; ++px) {
             for (PlottedElement& plotted : plots.get(world, {.x = px, .z = pz})) {
                 const auto placed = place(plotted, shape, side);
-                if (!placed || plotted.element.side <= 0) {
+                if (!placed || plotted.element.side <= 0 || !is_wanted(*placed)) {
                     continue;
                 }
                 if (!plotted.shape) {
@@ -110,9 +111,11 @@ void find_elements(Region& region, const World& world, PlotCache& plots,
     }
 }
 
-/// Raises S by an element that stands on layer heights `height`, and marks its columns.
-void lay_element(Region& region, const PlacedElement& placed, const float* height) {
+/// Marks the columns of an element that stands on layer heights `height`, and raises S by it unless
+/// it `replaces` what is above.
+void lay_element(Region& region, const PlacedElement& placed, const float* height, bool replaces) {
     const std::uint64_t gap_bit = std::uint64_t{1} << static_cast<unsigned>(placed.element().gap);
+    const std::uint8_t mark = replaces ? 0 : kElementStands;
     for (std::int32_t row = 0; row < placed.rows; ++row) {
         const auto first = static_cast<std::size_t>(
             (placed.row_first + row) * region.shape.stride() + placed.column_first);
@@ -122,8 +125,8 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
         for (std::size_t i = 0; i < static_cast<std::size_t>(placed.columns); ++i) {
             if (thickness[i] > 0) {
                 region.gap_mask[first + i] |= gap_bit;
-                region.irregular[first + i] |= kElementStands;
-                if (region.elements_lift) {
+                region.irregular[first + i] |= mark;
+                if (!replaces && region.elements_lift) {
                     region.stacked[first + i] =
                         std::max(region.stacked[first + i], height[first + i] + thickness[i]);
                 }
@@ -181,53 +184,105 @@ void build_flow(Region& region, const TerrainConstants& constants, std::size_t l
     const float* const heights = region.heights.data() + layer * region.plane_size();
     std::int32_t* const flow = region.flow.data() + layer * region.flow_plane_size();
     for (std::int32_t row = 0; row < inner.length; ++row) {
-        kernels.flow(flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
-                     heights + static_cast<std::ptrdiff_t>(row + 1) * stride + 1, stride,
-                     region.flow_stride, half_per_step);
+        kernels.flow(
+            flow + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+            region.noise.data() + static_cast<std::ptrdiff_t>(row) * region.flow_stride,
+            heights + static_cast<std::ptrdiff_t>(row + region.apron) * stride + region.apron,
+            stride, region.flow_stride, half_per_step);
+    }
+}
+
+void build_blends(Region& region, const TerrainConstants& constants, std::size_t layer,
+                  const RowKernels& kernels) {
+    const std::size_t plane = region.plane_size();
+    const std::int32_t* const y256 = region.y256.data() + layer * plane;
+    kernels.blends(region.middle.data() + layer * plane, region.irregular.data(), y256 - plane,
+                   y256, constants.rules[layer].blend_on_below, static_cast<std::int32_t>(plane));
+}
+
+void begin_region(Region& region, const World& world, const ColumnRectangle& rectangle,
+                  std::int32_t apron, PlotCache& plots, const RowKernels& kernels) {
+    TERRANE_ASSERT(rectangle.width >= 1 && rectangle.width <= kRectangleSideMax - 2 * apron &&
+                   rectangle.length >= 1 && rectangle.length <= kRectangleSideMax - 2 * apron);
+    region.inner = rectangle;
+    region.apron = apron;
+    region.elements_lift = world.definition.structure.lift;
+    region.shape = {.x0 = rectangle.x0 - apron * rectangle.step(),
+                    .z0 = rectangle.z0 - apron * rectangle.step(),
+                    .width = rectangle.width + 2 * apron,
+                    .length = rectangle.length + 2 * apron,
+                    .step = rectangle.step()};
+    region.flow_stride = padded_width(rectangle.width);
+    region.layers_built = 0;
+    allocate(region, world.stack.layers.size());
+    std::fill_n(region.stacked.begin(), region.plane_size(),
+                1.0F);  // the base is never thinner than a voxel
+    plots.trim();
+    if (region.elements_lift || !world.definition.has_landscape()) {
+        find_elements(region, world, plots, kernels, [](const PlacedElement&) { return true; });
+    } else {
+        region.elements.clear();
+        region.gap_begin.assign(world.stack.layers.size(), 0);
+    }
+}
+
+void build_layer(Region& region, const TerrainConstants& constants, const RowKernels& kernels) {
+    const std::size_t layers = constants.rules.size();
+    const std::size_t plane = region.plane_size();
+    const auto values = static_cast<std::int32_t>(plane);
+    const std::size_t k = region.layers_built++;
+    noise_rectangle(region.noise.data(), constants.height_noise[k], region.shape, kernels,
+                    region.noise_buffers);
+    float* const heights = region.heights.data() + k * plane;
+    kernels.heights(heights, region.stacked.data(), region.noise.data(), values,
+                    constants.heights[k]);
+    kernels.quantise(region.y256.data() + k * plane, heights, values);
+    const std::size_t end = k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
+    for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
+        lay_element(region, region.elements[e], heights, false);
+    }
+}
+
+void place_elements(Region& region, const World& world, const std::int32_t* shown256,
+                    PlotCache& plots, const RowKernels& kernels) {
+    if (region.elements_lift) {
+        return;  // they are there already
+    }
+    const std::size_t plane = region.plane_size();
+    find_elements(region, world, plots, kernels, [&](const PlacedElement& placed) {
+        const auto gap = static_cast<std::size_t>(placed.element().gap);
+        if (gap >= region.layers_built) {
+            return false;
+        }
+        const std::int32_t* const base = region.y256.data() + gap * plane;
+        bool shows = false;
+        for (std::int32_t row = placed.row_first; row < placed.row_first + placed.rows; ++row) {
+            const std::int32_t first = row * region.shape.stride() + placed.column_first;
+            for (std::int32_t i = first; i < first + placed.columns; ++i) {
+                shows = shows || base[i] < shown256[i];
+            }
+        }
+        return shows;
+    });
+    for (const PlacedElement& placed : region.elements) {
+        lay_element(region, placed,
+                    region.heights.data() + static_cast<std::size_t>(placed.element().gap) * plane,
+                    true);
     }
 }
 
 void build_region(Region& region, const World& world, const TerrainConstants& constants,
                   const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels) {
-    TERRANE_ASSERT(rectangle.width >= 1 && rectangle.width <= kRectangleSideMax - 2 &&
-                   rectangle.length >= 1 && rectangle.length <= kRectangleSideMax - 2);
+    begin_region(region, world, rectangle, 1, plots, kernels);
     const std::size_t layers = world.stack.layers.size();
-    region.inner = rectangle;
-    region.elements_lift = world.definition.structure.lift;
-    region.shape = {.x0 = rectangle.x0 - rectangle.step(),
-                    .z0 = rectangle.z0 - rectangle.step(),
-                    .width = rectangle.width + 2,
-                    .length = rectangle.length + 2,
-                    .step = rectangle.step()};
-    region.flow_stride = padded_width(rectangle.width);
-    allocate(region, layers);
-    plots.trim();
-    find_elements(region, world, plots, kernels);
     const std::size_t plane = region.plane_size();
     std::fill_n(region.middle.begin(), plane, 0);
-    std::fill_n(region.stacked.begin(), plane, 1.0F);  // the base is never thinner than a voxel
-    const auto values = static_cast<std::int32_t>(plane);
-    const bool is_plain = !world.definition.has_landscape();
     for (std::size_t k = 0; k < layers; ++k) {
-        noise_rectangle(region.noise.data(), constants.height_noise[k], region.shape, kernels,
-                        region.noise_buffers);
-        float* const heights = region.heights.data() + k * plane;
-        kernels.heights(heights, region.stacked.data(), region.noise.data(), values,
-                        constants.heights[k]);
-        std::int32_t* const y256 = region.y256.data() + k * plane;
-        kernels.quantise(y256, heights, values);
-        if (k > 0 && is_plain) {
-            kernels.blends(region.middle.data() + k * plane, region.irregular.data(), y256 - plane,
-                           y256, constants.rules[k].blend_on_below, values);
+        build_layer(region, constants, kernels);
+        if (k > 0) {
+            build_blends(region, constants, k, kernels);
         }
-        const std::size_t end = k + 1 < layers ? region.gap_begin[k + 1] : region.elements.size();
-        for (std::size_t e = region.gap_begin[k]; e < end; ++e) {
-            lay_element(region, region.elements[e], heights);
-        }
-        if (is_plain) {
-            build_flow(region, constants, k, kernels);
-        }
+        build_flow(region, constants, k, kernels);
     }
 }
 

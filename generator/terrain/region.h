@@ -1,7 +1,8 @@
 // One rectangle of columns, start to end: noise, heights, elements and flow as rasters.
 //
 // Rasters have one value a column, an apron of one column around the rectangle included (flow needs
-// the slope, meshes the neighbours). Every value is a function of (world, column) only.
+// the slope, meshes the neighbours); landscapes have a wider one. Every value is a function of
+// (world, column) only.
 #pragma once
 
 #include "generator/terrain/element.h"
@@ -44,10 +45,12 @@ inline constexpr std::uint8_t kElementStands = 2;
 /// A worker's rasters and buffers; refilled by build_region.
 struct Region {
     ColumnRectangle inner;
-    RectangleShape shape;  ///< inner and its apron of one
+    RectangleShape shape;    ///< inner and its apron
+    std::int32_t apron = 1;  ///< columns
     std::int32_t flow_stride = 0;
-    bool elements_lift = true;   ///< veins and caves lift what is above them
-    std::vector<float> stacked;  ///< S, the top of the stack so far
+    std::size_t layers_built = 0;  ///< planes of `heights` and `y256` that hold their layers
+    bool elements_lift = true;     ///< veins and caves lift what is above them
+    std::vector<float> stacked;    ///< S, the top of the stack so far
     std::vector<float> noise;
     std::vector<float> heights;            ///< K planes of shape.padded_size(): H_k
     std::vector<std::int32_t> y256;        ///< K planes, likewise: H_k in 1/256 voxel
@@ -59,7 +62,7 @@ struct Region {
     /// K planes: where each layer's blend into the one right below ends, in 1/256 voxel.
     std::vector<std::int32_t> middle;
     /// Per column of shape: bit 0 where a layer pinches out or a blend reaches its layer's top,
-    /// kElementStands where an element stands.
+    /// kElementStands where an element stands that lifts.
     std::vector<std::uint8_t> irregular;
 
     NoiseBuffers noise_buffers;
@@ -90,10 +93,27 @@ struct TerrainConstants {
     explicit TerrainConstants(const World& world);
 };
 
-/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results. A
-/// world with a landscape finds its blends later, and asks build_flow for the layers it shows.
+/// Fills `region` for the rectangle. One thread; `plots` memoises and never changes results.
 void build_region(Region& region, const World& world, const TerrainConstants& constants,
                   const ColumnRectangle& rectangle, PlotCache& plots, const RowKernels& kernels);
+
+/// The same in steps, for landscapes, which cut much of the stack away and need no more than the
+/// rest: begins with no layer, and with elements only if they lift what is above them.
+void begin_region(Region& region, const World& world, const ColumnRectangle& rectangle,
+                  std::int32_t apron, PlotCache& plots, const RowKernels& kernels);
+
+/// Builds the layer above those that are there, without flow and blends.
+void build_layer(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
+
+/// Fills one layer's plane of `region.middle` and marks irregular columns, once its heights are
+/// there; not for the lowest layer.
+void build_blends(Region& region, const TerrainConstants& constants, std::size_t layer,
+                  const RowKernels& kernels);
+
+/// Places elements that lift nothing, once the layers are there: those of gaps whose layer is
+/// built, as far as their layer's top lies below `shown256` in some column of shape.
+void place_elements(Region& region, const World& world, const std::int32_t* shown256,
+                    PlotCache& plots, const RowKernels& kernels);
 
 /// Fills one layer's plane of `region.flow`, once its heights are there.
 void build_flow(Region& region, const TerrainConstants& constants, std::size_t layer,

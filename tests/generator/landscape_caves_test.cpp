@@ -134,6 +134,14 @@ INSTANTIATE_TEST_SUITE_P(Worlds, LandscapeRock,
                          ::testing::Values("canyon", "karst", "fold", "range", "alpine", "coast"),
                          [](const auto& world) { return std::string(world.param); });
 
+TEST_P(LandscapeRock, HasCavesThatCanBeReached) {
+    const CaveShares shares = cave_shares(square_of(*load_shipped_world(GetParam())));
+    EXPECT_GT(shares.volume, 10000);
+    EXPECT_GE(shares.reached, 0.66);
+    std::printf("%s: %.0f voxels of caves, %.0f %% reached\n", GetParam(), shares.volume,
+                100 * shares.reached);
+}
+
 /// Of the six worlds; a single one may have more.
 TEST(LandscapeColumns, AreShortOnAverage) {
     double limits = 0;

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 
 namespace terrane {
@@ -97,6 +98,7 @@ TEST(Landscape, NothingStandsAboveTheHeightBoundAtAnyLevel) {
     }
 }
 
+/// Up to level 4 to the last bit; farther ones leave out what is narrower than their steps.
 TEST(Landscape, HeightsOfCoarseLevelsAreThoseOfLevel0) {
     // Without caves, overhangs and channels, whose banks know their neighbours.
     WorldDefinition definition = load_shipped_world("fold")->definition;
@@ -108,19 +110,22 @@ TEST(Landscape, HeightsOfCoarseLevelsAreThoseOfLevel0) {
     StackGenerator generator(*world);
     ColumnSet fine;
     ColumnSet coarse;
-    for (const std::int32_t lod : {1, 3, 5, 7}) {
+    for (const std::int32_t lod : {1, 3, 4, 5, 7}) {
         const std::int64_t step = std::int64_t{1} << lod;
+        std::int64_t apart256 = 0;
         ASSERT_TRUE(generator.generate(
             coarse, {.x0 = -40 * step, .z0 = 7 * step, .width = 6, .length = 6, .lod = lod}));
         for (std::int32_t z = 0; z < 6; ++z) {
             for (std::int32_t x = 0; x < 6; ++x) {
                 ASSERT_TRUE(generator.generate(
                     fine, {.x0 = (x - 40) * step, .z0 = (z + 7) * step, .width = 1, .length = 1}));
-                EXPECT_EQ(coarse.columns.column(x, z).back().y256,
-                          fine.columns.column(0, 0).back().y256)
-                    << lod;
+                const std::int32_t high = coarse.columns.column(x, z).back().y256;
+                const std::int32_t wanted = fine.columns.column(0, 0).back().y256;
+                EXPECT_TRUE(lod > 4 || high == wanted) << lod << ": " << high << ", " << wanted;
+                apart256 += std::abs(high - wanted);
             }
         }
+        EXPECT_LE(apart256 / 36, step * kUnitsPerVoxel / 20) << lod;
     }
 }
 

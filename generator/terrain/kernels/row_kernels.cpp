@@ -465,6 +465,153 @@ void valleys(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count
     }
 }
 
+void mix_cells(float* __restrict out, const float* __restrict values, const SplineShares& shares,
+               std::int32_t cells) {
+    for (std::int32_t cell = 0; cell < cells; ++cell) {
+        const float a = values[cell];
+        const float b = values[cell + 1];
+        const float c = values[cell + 2];
+        const float d = values[cell + 3];
+        float* __restrict const to = out + cell * kSplineCell;
+        for (std::int32_t e = 0; e < kSplineCell; ++e) {
+            to[e] = shares.of[0][e] * a + shares.of[1][e] * b + shares.of[2][e] * c +
+                    shares.of[3][e] * d;
+        }
+    }
+}
+
+void near_reach(const ReachRow& row, const ReachShape& reach) {
+    for (std::int32_t first = 0; first < row.count; first += kBlock) {
+        const float* __restrict const wander_x = row.wander_x + first;
+        const float* __restrict const wander_z = row.wander_z + first;
+        float* __restrict const square = row.square + first;
+        float* __restrict const along = row.along + first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float x = (row.x + row.step * static_cast<float>(first + i)) + wander_x[i];
+            const float z = row.z + wander_z[i];
+            static_assert(kReachSegments == 4);
+            Nearest nearest = nearer({}, x, z, reach, 0);
+            nearest = nearer(nearest, x, z, reach, 1);
+            nearest = nearer(nearest, x, z, reach, 2);
+            nearest = nearer(nearest, x, z, reach, 3);
+            square[i] = nearest.square;
+            along[i] = nearest.along;
+        }
+    }
+}
+
+bool resist(float* __restrict height, float* __restrict rest, const float* bottom,
+            const float* __restrict top, const LayerResistance& layer, std::int32_t count) {
+    const float cost = layer.cost;
+    const float inverse_cost = layer.inverse_cost;
+    const float concave = layer.concave;
+    std::int32_t left[kBlock] = {};
+    for (std::int32_t first = 0; first < count; first += kBlock) {
+        float thickness[kBlock];
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            thickness[i] = top[first + i];
+        }
+        if (bottom != nullptr) {
+            for (std::int32_t i = 0; i < kBlock; ++i) {
+                thickness[i] = top[first + i] - bottom[first + i];
+            }
+        }
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float limit = thickness[i] * cost;
+            const float before = rest[first + i];
+            const float most = limit < before ? limit : before;
+            const float m = 0.0F < most ? most : 0.0F;
+            height[first + i] +=
+                m * m * (1.0F + concave) / (m + concave * limit + 1e-9F) * inverse_cost;
+            const float after = before - limit;
+            rest[first + i] = after;
+            left[i] |= after > 0.0F ? 1 : 0;
+        }
+    }
+    std::int32_t any = 0;
+    for (std::int32_t i = 0; i < kBlock; ++i) {
+        any |= left[i];
+    }
+    return any != 0;
+}
+
+void raise_tops(float* __restrict raw_top, const float* bottom, const float* __restrict top,
+                float cost, std::int32_t count) {
+    if (bottom == nullptr) {
+        for (std::int32_t i = 0; i < count; ++i) {
+            raw_top[i] += top[i] * cost;
+        }
+        return;
+    }
+    const float* __restrict const below = bottom;
+    for (std::int32_t i = 0; i < count; ++i) {
+        raw_top[i] += (top[i] - below[i]) * cost;
+    }
+}
+
+LedgeSeen ledge(const LedgeRow& row) {
+    std::uint32_t* __restrict const lean = row.lean;
+    const float* __restrict const highest = row.highest;
+    const float* __restrict const raw = row.raw;
+    const float* __restrict const moved = row.moved;
+    const float* __restrict const raw_top = row.raw_top;
+    const float* __restrict const top = row.top;
+    const float* __restrict const bottom = row.bottom;
+    const std::uint32_t bit = row.bit;
+    const float thick_least = row.thick_least;
+    const std::int32_t count = row.count;
+    std::uint32_t any_leans = 0;
+    std::uint32_t any_lower = 0;
+    for (std::int32_t i = 0; i < count; ++i) {
+        const std::uint32_t is_lower = raw_top[i] <= highest[i] ? bit : 0;
+        const std::uint32_t is_above = raw_top[i] > raw[i] - moved[i] ? bit : 0;
+        const std::uint32_t is_thick = top[i] - bottom[i] > thick_least ? bit : 0;
+        const std::uint32_t leans = is_lower & is_above & is_thick;
+        lean[i] |= leans;
+        any_leans |= leans;
+        any_lower |= is_lower;
+    }
+    return {any_leans, any_lower};
+}
+
+void tube(const TubeRow& row, const TubePiece& piece) {
+    constexpr float kFlatFloor = 0.62F;
+    constexpr float kCeiling = 0.95F;
+    for (std::int32_t first = 0; first < row.count; first += kBlock) {
+        float* __restrict const floor = row.floor + first;
+        float* __restrict const lid = row.lid + first;
+        const float* __restrict const rough = row.rough + first;
+        const float* __restrict const ragged = row.ragged + first;
+        const float az = row.z - piece.z;
+        const std::int32_t left = row.count - first;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float ax = (row.x + static_cast<float>(first + i)) - piece.x;
+            const float t = clamp01((ax * piece.ex + az * piece.ez) * piece.inverse_square);
+            const float qx = ax - t * piece.ex;
+            const float qz = az - t * piece.ez;
+            const float r =
+                (piece.radius + t * piece.dr) * (1.0F + 0.25F * rough[i] + 0.15F * ragged[i]);
+            const float rest = r * r - (qx * qx + qz * qz);
+            const float hh = __builtin_sqrtf(rest > 0.0F ? rest : 0.0F);
+            const float up = kCeiling * (1.0F + 0.5F * ragged[i]);
+            const float y = piece.y + t * piece.dy;
+            const float reach = hh * piece.steep;
+            const float high = y + up * reach;
+            const float high_most = piece.y_max + up * hh;
+            const float new_lid = high < high_most ? high : high_most;
+            const float low = y - kFlatFloor * reach;
+            const float low_least = piece.y_min - kFlatFloor * hh;
+            const float new_floor = low > low_least ? low : low_least;
+            // A column of another row, or out of the tube, keeps what it has.
+            const bool is_in = static_cast<int>(rest > 0.0F) & static_cast<int>(i < left);
+            const float lid_here = is_in ? new_lid : -3.0e38F;
+            const float floor_here = is_in ? new_floor : 3.0e38F;
+            lid[i] = lid[i] < lid_here ? lid_here : lid[i];
+            floor[i] = floor[i] > floor_here ? floor_here : floor[i];
+        }
+    }
+}
+
 }  // namespace
 
 extern const RowKernels kKernels;
@@ -477,6 +624,12 @@ const RowKernels kKernels = {.gradients = gradients,
                              .plain_columns = plain_columns,
                              .element_tile = element_tile,
                              .erode = erode,
-                             .valleys = valleys};
+                             .valleys = valleys,
+                             .mix_cells = mix_cells,
+                             .near_reach = near_reach,
+                             .resist = resist,
+                             .raise_tops = raise_tops,
+                             .ledge = ledge,
+                             .tube = tube};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

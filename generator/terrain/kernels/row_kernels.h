@@ -134,6 +134,81 @@ struct ValleyConstants {
     float plateau = 0;
 };
 
+/// Shares of the four lattice points around a cell of columns, see generator/landscape/relief.h.
+inline constexpr std::int32_t kSplineCell = 8;
+
+struct SplineShares {
+    float of[4][kSplineCell];
+};
+
+/// Columns side by side that look for a reach, moved by how rivers wind; whole blocks are written.
+struct ReachRow {
+    float* square = nullptr;  ///< of the distance to the reach, columns^2
+    float* along = nullptr;   ///< where on it, 0 at its node and 1 at its end
+    const float* wander_x = nullptr;
+    const float* wander_z = nullptr;
+    float x = 0;  ///< of the first column, whole columns from the reach's node
+    float z = 0;
+    float step = 1;
+    std::int32_t count = 0;
+};
+
+/// A straight piece of a cave's tube, see generator/landscape/caves.h; columns from the tube's
+/// origin, voxels.
+struct TubePiece {
+    float x = 0;
+    float z = 0;
+    float ex = 0;  ///< to the piece's end, likewise the other changes
+    float ez = 0;
+    float inverse_square = 0;  ///< 1 / |e|^2, or 0
+    float y = 0;
+    float dy = 0;
+    float radius = 0;
+    float dr = 0;
+    float steep = 1;  ///< sqrt(1 + slope^2)
+    float y_min = 0;
+    float y_max = 0;
+};
+
+/// Columns side by side; whole blocks of the arrays can be written, though `count` values are.
+struct TubeRow {
+    float* floor = nullptr;
+    float* lid = nullptr;
+    const float* rough = nullptr;  ///< noise of walls
+    const float* ragged = nullptr;
+    float x = 0;  ///< of the first column, from the tube's origin
+    float z = 0;
+    std::int32_t count = 0;
+};
+
+/// What a layer does to slopes, see generator/landscape/resistance.h.
+struct LayerResistance {
+    float cost = 1;  ///< g: raw height of a voxel
+    float inverse_cost = 1;
+    float resistance = 1;  ///< rho
+    float concave = 0;     ///< e
+};
+
+/// A layer that may lean out over a row of columns, see generator/landscape/overhangs.h.
+struct LedgeRow {
+    std::uint32_t* lean = nullptr;  ///< gets `bit` where it may
+    const float* highest = nullptr;
+    const float* raw = nullptr;
+    const float* moved = nullptr;
+    const float* raw_top = nullptr;
+    const float* top = nullptr;
+    const float* bottom = nullptr;
+    std::uint32_t bit = 0;
+    float thick_least = 0;
+    std::int32_t count = 0;
+};
+
+/// Not 0 where some column has it.
+struct LedgeSeen {
+    std::uint32_t leans = 0;
+    std::uint32_t is_lower = 0;  ///< some lip is as high as the layer's top
+};
+
 struct RowKernels {
     /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
     /// the top four bits of mix(hash ^ row_value) number the sixteen unit vectors. Whole blocks.
@@ -171,6 +246,22 @@ struct RowKernels {
     /// order.
     void (*valleys)(ValleyPlaces& places, const ReachShape* reaches, std::int32_t count,
                     const ValleyConstants& constants);
+    /// Columns of `cells` cells next to each other, from the cells + 3 points around them.
+    void (*mix_cells)(float* out, const float* values, const SplineShares& shares,
+                      std::int32_t cells);
+    /// How far a reach is from each column.
+    void (*near_reach)(const ReachRow& row, const ReachShape& reach);
+    /// Goes up through a layer of the resistance map, see generator/landscape/resistance.h, in
+    /// whole blocks: `bottom` is null for the lowest layer. Whether some value is left.
+    bool (*resist)(float* height, float* rest, const float* bottom, const float* top,
+                   const LayerResistance& layer, std::int32_t count);
+    /// raw_top[i] += raw height of a layer; `bottom` is null for the lowest one. Whole blocks.
+    void (*raise_tops)(float* raw_top, const float* bottom, const float* top, float cost,
+                       std::int32_t count);
+    /// Where a layer may lean out.
+    LedgeSeen (*ledge)(const LedgeRow& row);
+    /// Lowers floors and raises lids to what a piece of a tube hollows out.
+    void (*tube)(const TubeRow& row, const TubePiece& piece);
 };
 
 namespace kernels_scalar {
