@@ -469,11 +469,13 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
     return place;
 }
 
-void ColumnMaker::mark_elements(std::span<const Limit> limits) {
-    for (const Limit& limit : limits) {
-        const std::size_t id = limit.palette_id;
-        if (id >= sources_.world.base_palette.size()) {
-            element_ids_[id - sources_.world.base_palette.size()] = 0;
+void ColumnMaker::mark_elements(const Limits& limits, std::size_t first, std::size_t end) {
+    const std::size_t first_id = sources_.world.base_palette.size();
+    for (std::size_t i = first; i < end; ++i) {
+        const std::size_t id = limits[i].palette_id;
+        if (id >= first_id) {
+            element_ids_[id - first_id] = 0;
+            element_limits_.push_back(static_cast<std::uint32_t>(i));
         }
     }
 }
@@ -526,7 +528,7 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
     const auto now = static_cast<std::size_t>(last - limits.data());
     // Only columns that lenses meet can show one.
     if (has_lenses) {
-        mark_elements(std::span(limits).subspan(used, now - used));
+        mark_elements(limits, used, now);
     }
     return now;
 }

@@ -38,9 +38,11 @@ struct ColumnSources {
 
 class ColumnMaker {
   public:
-    /// `element_ids`: those that show in some column become 0.
-    ColumnMaker(const ColumnSources& sources, std::span<std::uint16_t> element_ids)
-        : sources_(sources), element_ids_(element_ids) {}
+    /// `element_ids`: those that show in some column become 0; `element_limits` gets the numbers of
+    /// the limits where they do.
+    ColumnMaker(const ColumnSources& sources, std::span<std::uint16_t> element_ids,
+                std::vector<std::uint32_t>& element_limits)
+        : sources_(sources), element_ids_(element_ids), element_limits_(element_limits) {}
 
     /// Before the columns of a row.
     void begin_row(std::int32_t z);
@@ -69,10 +71,12 @@ class ColumnMaker {
     std::size_t write_block(LimitWriter& out, const Place& place, const Block& block,
                             std::int32_t end) const;
     void write_overhang(LimitWriter& out, const Place& place) const;
-    void mark_elements(std::span<const Limit> limits);
+    /// Of limits first to end - 1.
+    void mark_elements(const Limits& limits, std::size_t first, std::size_t end);
 
     ColumnSources sources_;
     std::span<std::uint16_t> element_ids_;
+    std::vector<std::uint32_t>& element_limits_;
 
     /// Of one column: rock between two planes, moved as a whole; heights in 1/256 voxel.
     struct Block {

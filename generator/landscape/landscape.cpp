@@ -355,30 +355,14 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
                        .folds = folds_,
                        .field = field_,
                        .field_first = field_index(region.shape, 0, 0)},
-                      out.element_ids);
+                      out.element_ids, out.element_limits);
     std::size_t used = 0;
     for (std::int32_t z = -apron; z < rectangle.length + apron; ++z) {
         maker.begin_row(z);
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
             const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
-<<<<<<< HEAD
-            maker.make(runs_, x, z, is_inner);
-            const std::size_t first = grid.limits.size();
-            runs_.write(grid.limits, world_->void_id());
-            grid.offsets.push_back(static_cast<std::uint32_t>(grid.limits.size()));
-            // Only columns that lenses meet can show one.
-            const auto at = static_cast<std::size_t>((z + 2) * shape.stride() + x + 2);
-            for (std::size_t i = first; region.gap_mask[at] != 0 && i < grid.limits.size(); ++i) {
-                const std::size_t id = grid.limits[i].palette_id;
-                if (id >= world_->base_palette.size()) {
-                    out.element_ids[id - world_->base_palette.size()] = 0;
-                    out.element_limits.push_back(static_cast<std::uint32_t>(i));
-                }
-            }
-=======
             used = maker.write(grid.limits, used, x, z, is_inner);
             grid.offsets.push_back(static_cast<std::uint32_t>(used));
->>>>>>> land
             if (is_inner) {
                 out.highest_y256 = std::max(out.highest_y256, grid.limits[used - 1].y256);
             }

@@ -106,14 +106,9 @@ Result<void> StackGenerator::generate(Stack& out, StackPos position) {
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
-<<<<<<< HEAD
            .element_ids = buffers_->element_ids,
            .element_limits = buffers_->element_limits},
-          rectangle, 1);
-=======
-           .element_ids = buffers_->element_ids},
           1);
->>>>>>> land
     return {};
 }
 
@@ -127,14 +122,9 @@ Result<void> StackGenerator::generate(ColumnSet& out, const ColumnRectangle& rec
     write({.grid = out.columns,
            .palette = out.palette,
            .highest_y256 = out.highest_y256,
-<<<<<<< HEAD
            .element_ids = buffers_->element_ids,
            .element_limits = buffers_->element_limits},
-          rectangle, 0);
-=======
-           .element_ids = buffers_->element_ids},
           0);
->>>>>>> land
     return {};
 }
 
