@@ -133,6 +133,21 @@ constexpr std::array<std::pair<const char*, Counter OutcomeCounters::*>, 6> kOut
 
 constexpr const char* kNoRoom = "too many sessions are open";
 
+std::vector<MetricSample> request_samples(const ServiceCounters& counters) {
+    std::vector<MetricSample> out;
+    for (std::size_t i = 0; i < kRequestKinds.size(); ++i) {
+        for (const auto& [outcome, member] : kOutcomes) {
+            out.push_back(
+                {.name = "terrane_requests_total",
+                 .help = "Requests, by what was asked and outcome",
+                 .kind = MetricSample::Kind::counter,
+                 .value = static_cast<double>(count_of(counters.outcomes[i].*member)),
+                 .labels = "kind=" + std::string(kRequestKinds[i]) + ",outcome=" + outcome});
+        }
+    }
+    return out;
+}
+
 /// What a port says to a client for whom there is no room.
 Bytes native_refusal() {
     return encode_message(Failure{.request_id = 0,
@@ -318,7 +333,7 @@ struct Server::Impl {
 
 std::vector<MetricSample> Server::Impl::samples() {
     using Kind = MetricSample::Kind;
-    std::vector<MetricSample> out;
+    std::vector<MetricSample> out = request_samples(counters);
     const auto add = [&out](Kind kind, const char* name, const char* help, auto value,
                             std::string labels = {}) {
         out.push_back({.name = name,
@@ -334,13 +349,6 @@ std::vector<MetricSample> Server::Impl::samples() {
     const auto gauge = [&add](const char* name, const char* help, auto value) {
         add(Kind::gauge, name, help, value);
     };
-    for (std::size_t i = 0; i < kRequestKinds.size(); ++i) {
-        for (const auto& [outcome, member] : kOutcomes) {
-            add(Kind::counter, "terrane_requests_total", "Requests, by what was asked and outcome",
-                count_of(counters.outcomes[i].*member),
-                "kind=" + std::string(kRequestKinds[i]) + ",outcome=" + outcome);
-        }
-    }
     counter("terrane_generations_total", "Chunk stacks made", counters.generations);
     counter("terrane_undelivered_total", "Answers that could not be handed on for want of memory",
             counters.undelivered);

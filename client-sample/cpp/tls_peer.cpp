@@ -4,22 +4,7 @@
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
 
-#include <array>
-
 namespace terrane {
-
-namespace {
-
-/// The oldest error that OpenSSL has noted on this thread, in its words; forgets all of them.
-std::string openssl_error() {
-    const unsigned long code = ERR_get_error();
-    ERR_clear_error();
-    std::array<char, 256> text{};
-    ERR_error_string_n(code, text.data(), text.size());
-    return code == 0 ? "unknown error" : text.data();
-}
-
-}  // namespace
 
 Result<void> demand_trust(ssl_ctx_st* context, const std::string& ca_file) {
     ERR_clear_error();
@@ -30,7 +15,7 @@ Result<void> demand_trust(ssl_ctx_st* context, const std::string& ca_file) {
                          : SSL_CTX_load_verify_locations(context, ca_file.c_str(), nullptr) == 1);
     if (!is_set) {
         return fail(ErrorCode::io_error, (ca_file.empty() ? "the system's certificates" : ca_file) +
-                                             ": cannot be read: " + openssl_error());
+                                             ": cannot be read as PEM certificates");
     }
     return {};
 }
@@ -48,7 +33,7 @@ Result<void> demand_host(ssl_st* connection, const std::string& host) {
                                   TLSEXT_NAMETYPE_host_name, name.data()) == 1;
     if (!is_told || SSL_set1_host(connection, host.c_str()) != 1) {
         return fail(ErrorCode::invalid_argument,
-                    "\"" + host + "\" is no name of a TLS server: " + openssl_error());
+                    "\"" + host + "\" is no name that a certificate could be good for");
     }
     return {};
 }

@@ -162,6 +162,15 @@ std::filesystem::path viewer_folder(const std::string& said) {
     return {};
 }
 
+SessionCaps caps_of(const ServerConfig& config) {
+    SessionCaps caps;
+    caps.view_radius_max = static_cast<std::uint32_t>(config.view_radius_max);
+    caps.credit_window_bytes = static_cast<std::uint32_t>(config.credit_window_bytes);
+    caps.requests_per_second_max = static_cast<std::uint32_t>(config.requests_per_second_max);
+    caps.bytes_per_second_max = config.bytes_per_second_max;
+    return caps;
+}
+
 /// All but the world.
 Result<ServerOptions> options_of(const ServerConfig& config) {
     ServerOptions options;
@@ -218,11 +227,7 @@ Result<ServerOptions> options_of(const ServerConfig& config) {
     options.listen.io_threads = config.io_threads;
     options.listen.sessions_max = config.sessions_max;
     options.listen.sessions_per_address_max = config.sessions_per_address_max;
-    options.caps.view_radius_max = static_cast<std::uint32_t>(config.view_radius_max);
-    options.caps.credit_window_bytes = static_cast<std::uint32_t>(config.credit_window_bytes);
-    options.caps.requests_per_second_max =
-        static_cast<std::uint32_t>(config.requests_per_second_max);
-    options.caps.bytes_per_second_max = config.bytes_per_second_max;
+    options.caps = caps_of(config);
     const auto seconds = [](std::uint64_t count) {
         return std::chrono::milliseconds(count * 1000);
     };

@@ -58,7 +58,7 @@ class RequestLogTest : public testing::Test {
 
     /// Ends the server, so that nothing more is logged.
     std::string logged() {
-        server_->stop(1s);
+        server_->stop(50ms);
         return testing::internal::GetCapturedStderr();
     }
 
