@@ -4,6 +4,7 @@
 #include "generator/terrain/random.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrane {
@@ -71,22 +72,40 @@ void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers
     }
 }
 
+static_assert(kVectorPad == 16);
+
+/// Of a block, in halves: a chain of sixteen would wait for each.
+template <typename Choose>
+float least_of_block(const float* __restrict values, Choose choose) {
+    std::array<float, 8> eight;
+    std::array<float, 4> four;
+    for (std::size_t i = 0; i < 8; ++i) {
+        eight[i] = choose(values[i], values[i + 8]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+        four[i] = choose(eight[i], eight[i + 4]);
+    }
+    return choose(choose(four[0], four[2]), choose(four[1], four[3]));
+}
+
 /// How near the points come to each block of columns; the padding repeats the last column.
 void bound_points(std::vector<ErosionBound>& bounds, const float* points, const float* fraction_x,
                   std::size_t plane) {
+    const auto lower = [](float a, float b) { return a < b ? a : b; };
+    const auto higher = [](float a, float b) { return a < b ? b : a; };
     bounds.clear();
     for (std::size_t first = 0; first < plane; first += kVectorPad) {
         for (std::size_t point = 0; point < kErosionPoints; ++point) {
             const float* const px = points + point * plane + first;
             const float* const pz = px + kErosionPoints * plane;
-            ErosionBound bound{.square_x = 1e9F, .z_min = pz[0], .z_max = pz[0]};
+            std::array<float, kVectorPad> square;
             for (std::size_t i = 0; i < kVectorPad; ++i) {
                 const float x = fraction_x[first + i] - px[i];
-                bound.square_x = std::min(bound.square_x, x * x);
-                bound.z_min = std::min(bound.z_min, pz[i]);
-                bound.z_max = std::max(bound.z_max, pz[i]);
+                square[i] = x * x;
             }
-            bounds.push_back(bound);
+            bounds.push_back({.square_x = least_of_block(square.data(), lower),
+                              .z_min = least_of_block(pz, lower),
+                              .z_max = least_of_block(pz, higher)});
         }
     }
 }
@@ -100,7 +119,8 @@ struct Slopes {
 };
 
 void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
-                const RectangleShape& shape, const RowKernels& kernels, ErosionBuffers& buffers) {
+                const RectangleShape& shape, bool is_last, const RowKernels& kernels,
+                ErosionBuffers& buffers) {
     const auto plane = static_cast<std::size_t>(shape.stride());
     float* const fraction_x = buffers.points.data();
     float* const points = fraction_x + plane;
@@ -144,7 +164,8 @@ void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
                        .fraction_z = place.fraction,
                        .amplitude = octave.amplitude,
                        .steepening = octave.steepening,
-                       .count = shape.stride()});
+                       .count = shape.stride(),
+                       .is_last = is_last});
     }
 }
 
@@ -206,7 +227,7 @@ void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConst
             }
             continue;
         }
-        run_octave(sum, slopes, octave, shape, kernels, buffers);
+        run_octave(sum, slopes, octave, shape, o + 1 == constants.octave_count, kernels, buffers);
     }
 }
 

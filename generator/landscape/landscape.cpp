@@ -329,8 +329,10 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
     grid.x_first = grid.z_first = -apron;
     grid.width = rectangle.width + 2 * apron;
     grid.length = rectangle.length + 2 * apron;
-    grid.offsets.clear();
-    grid.offsets.push_back(0);
+    grid.offsets.resize(
+        static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.length) + 1);
+    std::uint32_t* end_of = grid.offsets.data();
+    *end_of++ = 0;
     out.element_ids.assign(region.elements.size(), kNoPaletteId);
     out.highest_y256 = 0;
     ColumnMaker maker({.world = *world_,
@@ -356,7 +358,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
             const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
             used = maker.write(grid.limits, used, x, z, is_inner);
-            grid.offsets.push_back(static_cast<std::uint32_t>(used));
+            *end_of++ = static_cast<std::uint32_t>(used);
             if (is_inner) {
                 out.highest_y256 = std::max(out.highest_y256, grid.limits[used - 1].y256);
             }
