@@ -48,11 +48,16 @@ struct ColumnMaker::Place {
 };
 
 /// The planes that pass under the ground part the column.
-void ColumnMaker::find_blocks(const Place& place) {
-    const auto planes = sources_.fractures.planes(place.field_at);
+void ColumnMaker::find_blocks(const Place& place, std::span<const PlaneInColumn> planes) {
     const float fold = sources_.folds[place.field_at];
-    if (planes.empty()) {
-        blocks_[0] = {.bottom = 0, .top = place.top256, .moved = to_256(fold)};
+    float moved_whole = fold;
+    bool is_parted = false;
+    for (const PlaneInColumn& plane : planes) {
+        moved_whole += plane.y <= 0 ? -plane.half_throw : plane.half_throw;
+        is_parted = is_parted || (plane.half_throw > 0 && plane.y > 0 && plane.y < place.ground);
+    }
+    if (!is_parted) {
+        blocks_[0] = {.bottom = 0, .top = place.top256, .moved = to_256(moved_whole)};
         block_count_ = 1;
         return;
     }
@@ -120,12 +125,12 @@ void ColumnMaker::find_lenses(const Place& place, const Block& block) {
     }
 }
 
-void ColumnMaker::find_sheets(const Place& place) {
+void ColumnMaker::find_sheets(const Place& place, std::span<const PlaneInColumn> planes) {
     const auto& fillings = sources_.constants.palette.fillings;
     if (fillings.empty()) {
         return;
     }
-    for (const PlaneInColumn& plane : sources_.fractures.planes(place.field_at)) {
+    for (const PlaneInColumn& plane : planes) {
         if (plane.half_sheet <= 0) {
             continue;
         }
@@ -483,13 +488,16 @@ void ColumnMaker::mark_elements(const Limits& limits, std::size_t first, std::si
 std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
                                bool has_flow) {
     const Place place = place_at(x, z, has_flow);
-    find_blocks(place);
+    const auto planes = sources_.fractures.planes(place.field_at);
+    find_blocks(place, planes);
     overlays_.clear();
     const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
     for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
         find_lenses(place, blocks_[b]);
     }
-    find_sheets(place);
+    if (!planes.empty()) {
+        find_sheets(place, planes);
+    }
     const Cover cover = cover_of(place);
     const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
     // The cover flows as what it lies on.

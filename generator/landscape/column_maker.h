@@ -58,9 +58,9 @@ class ColumnMaker {
     struct Block;
 
     Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
-    void find_blocks(const Place& place);
+    void find_blocks(const Place& place, std::span<const PlaneInColumn> planes);
     void find_lenses(const Place& place, const Block& block);
-    void find_sheets(const Place& place);
+    void find_sheets(const Place& place, std::span<const PlaneInColumn> planes);
     Cover cover_of(const Place& place) const;
     bool is_by_water(const Place& place) const;
     float lowest_around(const Place& place) const;

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
 namespace terrane {
 namespace {
@@ -73,22 +72,40 @@ void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers
     }
 }
 
+static_assert(kVectorPad == 16);
+
+/// Of a block, in halves: a chain of sixteen would wait for each.
+template <typename Choose>
+float least_of_block(const float* __restrict values, Choose choose) {
+    std::array<float, 8> eight;
+    std::array<float, 4> four;
+    for (std::size_t i = 0; i < 8; ++i) {
+        eight[i] = choose(values[i], values[i + 8]);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+        four[i] = choose(eight[i], eight[i + 4]);
+    }
+    return choose(choose(four[0], four[2]), choose(four[1], four[3]));
+}
+
 /// How near the points come to each block of columns; the padding repeats the last column.
 void bound_points(std::vector<ErosionBound>& bounds, const float* points, const float* fraction_x,
                   std::size_t plane) {
+    const auto lower = [](float a, float b) { return a < b ? a : b; };
+    const auto higher = [](float a, float b) { return a < b ? b : a; };
     bounds.clear();
     for (std::size_t first = 0; first < plane; first += kVectorPad) {
         for (std::size_t point = 0; point < kErosionPoints; ++point) {
             const float* const px = points + point * plane + first;
             const float* const pz = px + kErosionPoints * plane;
-            ErosionBound bound{.square_x = 1e9F, .z_min = pz[0], .z_max = pz[0]};
+            std::array<float, kVectorPad> square;
             for (std::size_t i = 0; i < kVectorPad; ++i) {
                 const float x = fraction_x[first + i] - px[i];
-                bound.square_x = std::min(bound.square_x, x * x);
-                bound.z_min = std::min(bound.z_min, pz[i]);
-                bound.z_max = std::max(bound.z_max, pz[i]);
+                square[i] = x * x;
             }
-            bounds.push_back(bound);
+            bounds.push_back({.square_x = least_of_block(square.data(), lower),
+                              .z_min = least_of_block(pz, lower),
+                              .z_max = least_of_block(pz, higher)});
         }
     }
 }
@@ -102,7 +119,8 @@ struct Slopes {
 };
 
 void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
-                const RectangleShape& shape, const RowKernels& kernels, ErosionBuffers& buffers) {
+                const RectangleShape& shape, bool is_last, const RowKernels& kernels,
+                ErosionBuffers& buffers) {
     const auto plane = static_cast<std::size_t>(shape.stride());
     float* const fraction_x = buffers.points.data();
     float* const points = fraction_x + plane;
@@ -146,52 +164,8 @@ void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
                        .fraction_z = place.fraction,
                        .amplitude = octave.amplitude,
                        .steepening = octave.steepening,
-                       .count = shape.stride()});
-    }
-}
-
-/// The shape's even columns, which it begins and ends with.
-RectangleShape halved(const RectangleShape& shape) {
-    return {.x0 = shape.x0,
-            .z0 = shape.z0,
-            .width = shape.width / 2 + 1,
-            .length = shape.length / 2 + 1,
-            .step = 2};
-}
-
-/// to[i] = from[2 i], rows and columns; `to` is of the halved shape.
-void take_even(float* to, const RectangleShape& half, const float* from,
-               const RectangleShape& shape) {
-    for (std::int32_t z = 0; z < half.length; ++z) {
-        const float* __restrict const row = from + std::ptrdiff_t{2} * z * shape.stride();
-        float* __restrict const out = to + static_cast<std::ptrdiff_t>(z) * half.stride();
-        for (std::int32_t x = 0; x < half.width; ++x) {
-            out[x] = row[2 * x];
-        }
-        std::fill(out + half.width, out + half.stride(), out[half.width - 1]);
-    }
-}
-
-/// The other way round: means in between.
-void fill_between(float* to, const RectangleShape& shape, const float* from,
-                  const RectangleShape& half) {
-    std::array<float, kRectangleSideMax + kVectorPad> mean{};
-    const auto spread = [width = half.width](float* __restrict out, const float* __restrict row) {
-        for (std::int32_t x = 0; x < width; ++x) {
-            out[2 * x] = row[x];
-            out[2 * x + 1] = 0.5F * (row[x] + row[x + 1]);  // the last is padding
-        }
-    };
-    for (std::int32_t z = 0; z < half.length; ++z) {
-        const float* const row = from + static_cast<std::ptrdiff_t>(z) * half.stride();
-        float* const out = to + std::ptrdiff_t{2} * z * shape.stride();
-        spread(out, row);
-        if (z + 1 < half.length) {
-            for (std::int32_t x = 0; x <= half.width; ++x) {
-                mean[static_cast<std::size_t>(x)] = 0.5F * (row[x] + row[x + half.stride()]);
-            }
-            spread(out + shape.stride(), mean.data());
-        }
+                       .count = shape.stride(),
+                       .is_last = is_last});
     }
 }
 
@@ -210,9 +184,6 @@ ErosionConstants::ErosionConstants(const WorldDefinition& definition) {
             .steepening = static_cast<float>(0.5 * amplitude * 6.28318530718 * 0.75 / period)};
         (octave_count <= kCoarseOctaves ? coarse_amplitude : fine_amplitude) +=
             static_cast<float>(amplitude);
-        if (period >= kHalvedPeriod) {
-            halved_count = octave_count;
-        }
         amplitude /= 2;
         period /= 2;
     }
@@ -229,65 +200,25 @@ void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConst
         }
         return;
     }
-    const bool is_halved = shape.step == 1 && constants.halved_count > 0;
-    const RectangleShape half = halved(shape);
-    const RectangleShape& first = is_halved ? half : shape;
     const std::size_t size = shape.padded_size();
-    const std::size_t first_size = first.padded_size();
     const auto row_size = static_cast<std::size_t>(shape.stride());
-    buffers.floats.resize(std::max(buffers.floats.size(), 2 * size + 6 * first_size));
+    buffers.floats.resize(std::max(buffers.floats.size(), 2 * size));
     buffers.points.resize(std::max(buffers.points.size(), (2 * kErosionPoints + 1) * row_size));
-    float* memory = buffers.floats.data();
-    const auto take = [&memory](std::size_t count) {
-        return std::exchange(memory, memory + count);
-    };
-    const Slopes whole{.x = relief.slope_x.data(),
-                       .z = relief.slope_z.data(),
-                       .mask = take(size),
-                       .fade = take(size)};
-    Slopes slopes = whole;
-    float* coarse_sum = coarse;
-    float* fine_sum = fine;
-    float* crest = relief.crest.data();
-    if (is_halved) {
-        slopes = {.x = take(first_size),
-                  .z = take(first_size),
-                  .mask = take(first_size),
-                  .fade = take(first_size)};
-        coarse_sum = take(first_size);
-        fine_sum = take(first_size);
-        crest = slopes.fade;
-        take_even(slopes.x, half, whole.x, shape);
-        take_even(slopes.z, half, whole.z, shape);
-        take_even(crest, half, relief.crest.data(), shape);
-    }
-    std::fill_n(coarse_sum, first_size, constants.coarse_amplitude);
-    std::fill_n(fine_sum, first_size, 0.0F);
-    for (std::size_t i = 0; i < first_size; ++i) {
+    const Slopes slopes{.x = relief.slope_x.data(),
+                        .z = relief.slope_z.data(),
+                        .mask = buffers.floats.data(),
+                        .fade = buffers.floats.data() + size};
+    std::fill_n(coarse, size, constants.coarse_amplitude);
+    std::fill_n(fine, size, 0.0F);
+    for (std::size_t i = 0; i < size; ++i) {
         const float x = slopes.x[i];
         const float z = slopes.z[i];
         slopes.mask[i] = ease(1.1F * std::sqrt(x * x + z * z));
-        slopes.fade[i] = std::min(1.0F, std::max(-1.0F, 2.0F * crest[i] - 1.0F));
+        slopes.fade[i] = std::min(1.0F, std::max(-1.0F, 2.0F * relief.crest[i] - 1.0F));
     }
-    const auto to_whole = [&](bool is_last) {
-        fill_between(coarse, shape, coarse_sum, half);
-        fill_between(fine, shape, fine_sum, half);
-        if (!is_last) {
-            fill_between(whole.x, shape, slopes.x, half);
-            fill_between(whole.z, shape, slopes.z, half);
-            fill_between(whole.mask, shape, slopes.mask, half);
-            fill_between(whole.fade, shape, slopes.fade, half);
-        }
-        slopes = whole;
-        coarse_sum = coarse;
-        fine_sum = fine;
-    };
     for (std::size_t o = 0; o < constants.octave_count; ++o) {
         const GullyOctave& octave = constants.octaves[o];
-        if (is_halved && o == constants.halved_count) {
-            to_whole(false);
-        }
-        float* const sum = o < ErosionConstants::kCoarseOctaves ? coarse_sum : fine_sum;
+        float* const sum = o < ErosionConstants::kCoarseOctaves ? coarse : fine;
         if (shape.step > ErosionConstants::kExactSteps &&
             octave.period < 2 * static_cast<double>(shape.step)) {
             // Stripes that are too narrow to be seen: their mean.
@@ -296,11 +227,7 @@ void erode(float* coarse, float* fine, ReliefRasters& relief, const ErosionConst
             }
             continue;
         }
-        run_octave(sum, slopes, octave, is_halved && o < constants.halved_count ? half : shape,
-                   kernels, buffers);
-    }
-    if (is_halved && constants.halved_count == constants.octave_count) {
-        to_whole(true);
+        run_octave(sum, slopes, octave, shape, o + 1 == constants.octave_count, kernels, buffers);
     }
 }
 

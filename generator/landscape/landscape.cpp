@@ -11,22 +11,17 @@
 namespace terrane {
 namespace {
 
-/// The columns that overhangs look at, and those of a region. At level 0 it begins and ends on even
-/// columns, as the erosion filter wants it.
+/// The columns of a region and those that overhangs look at.
 RectangleShape field_of(const RectangleShape& shape, std::int32_t apron, std::int32_t reach) {
     if (shape.step != 1) {
         return shape;
     }
     // Overhangs stand over the rectangle and a column around it.
-    const std::int64_t margin = std::max(0, reach + 1 - apron);
-    const std::int64_t x0 = shape.x0 - margin;
-    const std::int64_t z0 = shape.z0 - margin;
-    const std::int64_t x1 = shape.x0 + shape.width - 1 + margin;
-    const std::int64_t z1 = shape.z0 + shape.length - 1 + margin;
-    RectangleShape field{.x0 = x0 - (x0 & 1), .z0 = z0 - (z0 & 1)};
-    field.width = static_cast<std::int32_t>(x1 + (x1 & 1) - field.x0 + 1);
-    field.length = static_cast<std::int32_t>(z1 + (z1 & 1) - field.z0 + 1);
-    return field;
+    const std::int32_t margin = std::max(0, reach + 1 - apron);
+    return {.x0 = shape.x0 - margin,
+            .z0 = shape.z0 - margin,
+            .width = shape.width + 2 * margin,
+            .length = shape.length + 2 * margin};
 }
 
 /// Keeps the inner part of a raster.
@@ -334,8 +329,10 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
     grid.x_first = grid.z_first = -apron;
     grid.width = rectangle.width + 2 * apron;
     grid.length = rectangle.length + 2 * apron;
-    grid.offsets.clear();
-    grid.offsets.push_back(0);
+    grid.offsets.resize(
+        static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.length) + 1);
+    std::uint32_t* end_of = grid.offsets.data();
+    *end_of++ = 0;
     out.element_ids.assign(region.elements.size(), kNoPaletteId);
     out.element_limits.clear();
     out.highest_y256 = 0;
@@ -362,7 +359,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
             const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
             used = maker.write(grid.limits, used, x, z, is_inner);
-            grid.offsets.push_back(static_cast<std::uint32_t>(used));
+            *end_of++ = static_cast<std::uint32_t>(used);
             if (is_inner) {
                 out.highest_y256 = std::max(out.highest_y256, grid.limits[used - 1].y256);
             }

@@ -204,8 +204,10 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
     over_.resize(size);
     for (std::size_t i = 0; i < size; ++i) {
         // A column that can be no lip is as if it had no rock.
-        over_[i] = input.crest[i] >= 0.27F && input.fine[i] >= -1.0F ? input.raw[i] - input.moved[i]
-                                                                     : kNothing;
+        const bool is_lip = (static_cast<int>(input.crest[i] >= 0.27F) &
+                             static_cast<int>(input.fine[i] >= -1.0F)) != 0;
+        const float over = input.raw[i] - input.moved[i];
+        over_[i] = is_lip ? over : kNothing;
     }
     dilate(highest_, row_highest_, reach_, over_, field, constants.reach);
     if (!find_ledges(constants, resistance, input, region, terrain, kernels)) {

@@ -390,6 +390,7 @@ void erode(const ErosionRow& row) {
         float* __restrict const sum = row.sum + first;
         const float amplitude = row.amplitude;
         const float steepening = row.steepening;
+        float turned[kBlock];
         for (std::int32_t i = 0; i < kBlock; ++i) {
             const float inverse = 1.0F / (stripes.weight[i] + 1e-9F);
             const float c0 = stripes.cosine[i] * inverse;
@@ -397,12 +398,17 @@ void erode(const ErosionRow& row) {
             const float length = __builtin_sqrtf(c0 * c0 + s0 * s0);
             const float strength = 1.0F / (length > 0.5F ? length : 0.5F);
             const float c = c0 * strength;
-            const float s = s0 * strength;
-            const float m = mask[i];
-            const float delta = fade_of[i] + m * (c - fade_of[i]);
+            turned[i] = s0 * strength;
+            const float delta = fade_of[i] + mask[i] * (c - fade_of[i]);
             sum[i] += amplitude * delta;
             fade_of[i] = delta;
-            const float rest = 1.0F - m;
+        }
+        if (row.is_last) {
+            continue;  // nobody asks for what the slopes become
+        }
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const float s = turned[i];
+            const float rest = 1.0F - mask[i];
             const float open = 1.0F - clamp01(1.4F * absolute(s));
             mask[i] = (1.0F - rest * __builtin_sqrtf(rest)) * (1.0F - open * open);
             const float turn = s < 0.0F ? steepening : -steepening;

@@ -99,6 +99,7 @@ struct ErosionRow {
     float amplitude = 0;     ///< voxels
     float steepening = 0;    ///< what a stripe adds to the slope
     std::int32_t count = 0;  ///< a multiple of kVectorPad
+    bool is_last = false;    ///< of the octaves: slopes and mask may stay as they are
 };
 
 inline constexpr std::int32_t kErosionPoints = 9;
