@@ -5,6 +5,7 @@
 #include "generator/volume/limit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -22,6 +23,11 @@ constexpr std::uint16_t palette_id_of(LimitTail tail) {
 
 constexpr LimitTail tail_of(std::uint16_t id, std::int32_t packed_flow) {
     return id | std::uint64_t{static_cast<std::uint32_t>(packed_flow)} << 16U;
+}
+
+/// A height in 1/256 voxel.
+inline std::int32_t to_256(float voxels) {
+    return static_cast<std::int32_t>(std::floor(voxels * 256.0F + 0.5F));
 }
 
 /// What lies in low..high whatever the layers are there.

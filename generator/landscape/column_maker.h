@@ -53,7 +53,25 @@ class ColumnMaker {
                       bool has_flow);
 
   private:
-    struct Place;
+    static constexpr float kSandWidths = 2.2F;  ///< half widths of a river: its banks
+
+    /// Where a column's values lie.
+    struct Place {
+        std::size_t at = 0;        ///< in the region's rasters
+        std::size_t field_at = 0;  ///< in the field's
+        std::int32_t column = 0;   ///< of the region's shape
+        std::int32_t row = 0;
+        float ground = 0;
+        float water = kNoWater;
+        std::int32_t top256 = 0;
+        const std::int32_t* flow = nullptr;  ///< null: none
+        std::ptrdiff_t flow_plane = 0;
+
+        std::int32_t flow_of(std::size_t layer) const {
+            return flow == nullptr ? 0 : flow[static_cast<std::ptrdiff_t>(layer) * flow_plane];
+        }
+    };
+
     struct Cover;
     struct Block;
 

@@ -1,9 +1,10 @@
 // The landscape of a world: the stack of layers bent, cut and pierced, as limits.
 //
-// Order of work for a rectangle of columns: version 1's region (heights, lenses and flow of the
-// stack); folds and fractures; rivers and relief; the erosion filter; the resistance map; dolines,
-// channels and the sea; caves; and then column by column from the bottom to the top. Each step is a
-// file of this folder and a function of (world, column): regions of any size give the same bytes.
+// Order of work for a rectangle of columns: folds and fractures; rivers and relief; the erosion
+// filter; the resistance map and overhangs, which ask for version 1's layers one by one; dolines,
+// channels, the sea and banks; caves; lenses and flow of the layers that show; and then column by
+// column from the bottom to the top. Each step is a file of this folder and a function of (world,
+// column): regions of any size give the same bytes.
 #pragma once
 
 #include "generator/landscape/caves.h"

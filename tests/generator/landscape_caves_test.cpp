@@ -142,6 +142,30 @@ TEST_P(LandscapeRock, HasCavesThatCanBeReached) {
                 100 * shares.reached);
 }
 
+/// Neither between two that show the same nor third at one height.
+TEST_P(LandscapeRock, HasNoLimitForNothing) {
+    constexpr std::int32_t kSide = 128;
+    std::size_t limits = 0;
+    std::size_t idle = 0;
+    for_each_column(*load_shipped_world(GetParam()), 700, -300, kSide, 64,
+                    [&](std::int32_t, std::int32_t, std::span<const Limit> column, const Palette&) {
+                        limits += column.size();
+                        const auto same = [](const Limit& a, const Limit& b) {
+                            return a.palette_id == b.palette_id && a.flow == b.flow;
+                        };
+                        for (std::size_t i = 1; i + 1 < column.size(); ++i) {
+                            const Limit& before = column[i - 1];
+                            const Limit& after = column[i + 1];
+                            idle += (same(before, column[i]) && same(column[i], after)) ||
+                                            before.y256 == after.y256
+                                        ? std::size_t{1}
+                                        : std::size_t{0};
+                        }
+                    });
+    EXPECT_GT(limits, std::size_t{10} * kSide * kSide);
+    EXPECT_EQ(idle, 0U);
+}
+
 /// Of the six worlds; a single one may have more.
 TEST(LandscapeColumns, AreShortOnAverage) {
     double limits = 0;
