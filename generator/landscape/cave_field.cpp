@@ -85,14 +85,14 @@ void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleS
             columns.first = std::min(columns.first, own_columns.first);
             columns.end = std::max(columns.end, own_columns.end);
             const std::int32_t first = row * shape.stride() + own_columns.first;
-            kernels.tube({.floor = tube_floor_.data() + first,
-                          .lid = tube_lid_.data() + first,
-                          .rough = rough_.data() + first,
-                          .ragged = ragged_.data() + first,
-                          .x = static_cast<float>(shape.x0 + own_columns.first - tube.x),
-                          .z = static_cast<float>(shape.z0 + row - tube.z),
-                          .count = own_columns.end - own_columns.first},
-                         piece);
+            kernels.landscape->tube({.floor = tube_floor_.data() + first,
+                                     .lid = tube_lid_.data() + first,
+                                     .rough = rough_.data() + first,
+                                     .ragged = ragged_.data() + first,
+                                     .x = static_cast<float>(shape.x0 + own_columns.first - tube.x),
+                                     .z = static_cast<float>(shape.z0 + row - tube.z),
+                                     .count = own_columns.end - own_columns.first},
+                                    piece);
         }
     }
     for (std::int32_t row = rows.first; row < rows.end; ++row) {

@@ -103,7 +103,7 @@ void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
             const auto first = static_cast<std::size_t>(row * shape.stride() + columns.first);
             const std::int32_t count = columns.end - columns.first;
             // From the reach, not from the region: the same bits for every region.
-            kernels.near_reach(
+            kernels.landscape->near_reach(
                 {.square = square.data(),
                  .along = along.data(),
                  .wander_x = relief.wander_x.data() + first,

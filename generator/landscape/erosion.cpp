@@ -152,20 +152,20 @@ void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
             filled = place.cell;
         }
         const auto first = static_cast<std::ptrdiff_t>(z) * shape.stride();
-        kernels.erode({.slope_x = slopes.x + first,
-                       .slope_z = slopes.z + first,
-                       .mask = slopes.mask + first,
-                       .fade = slopes.fade + first,
-                       .sum = sum + first,
-                       .fraction_x = fraction_x,
-                       .points = points,
-                       .plane = static_cast<std::int64_t>(plane),
-                       .bounds = buffers.bounds.data(),
-                       .fraction_z = place.fraction,
-                       .amplitude = octave.amplitude,
-                       .steepening = octave.steepening,
-                       .count = shape.stride(),
-                       .is_last = is_last});
+        kernels.landscape->erode({.slope_x = slopes.x + first,
+                                  .slope_z = slopes.z + first,
+                                  .mask = slopes.mask + first,
+                                  .fade = slopes.fade + first,
+                                  .sum = sum + first,
+                                  .fraction_x = fraction_x,
+                                  .points = points,
+                                  .plane = static_cast<std::int64_t>(plane),
+                                  .bounds = buffers.bounds.data(),
+                                  .fraction_z = place.fraction,
+                                  .amplitude = octave.amplitude,
+                                  .steepening = octave.steepening,
+                                  .count = shape.stride(),
+                                  .is_last = is_last});
     }
 }
 

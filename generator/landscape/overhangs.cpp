@@ -156,8 +156,9 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
                 build_layer(region, terrain, kernels);
             }
             const float* const top = region.heights.data() + k * plane;
-            kernels.raise_tops(raw_top_.data(), k == 0 ? nullptr : top - plane, top,
-                               resistance.layers[k].cost, static_cast<std::int32_t>(plane));
+            kernels.landscape->raise_tops(raw_top_.data(), k == 0 ? nullptr : top - plane, top,
+                                          resistance.layers[k].cost,
+                                          static_cast<std::int32_t>(plane));
         }
         const float* const top = region.heights.data() + ledge * plane;
         std::uint32_t any_here = 0;
@@ -166,16 +167,17 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
             const auto first = static_cast<std::size_t>(z * shape.stride());
             const auto center =
                 static_cast<std::size_t>((z + margin_z) * field.stride() + margin_x);
-            const LedgeSeen seen = kernels.ledge({.lean = lean_.data() + first + 1,
-                                                  .highest = highest_.data() + center + 1,
-                                                  .raw = input.raw + center + 1,
-                                                  .moved = input.moved + center + 1,
-                                                  .raw_top = raw_top_.data() + first + 1,
-                                                  .top = top + first + 1,
-                                                  .bottom = top - plane + first + 1,
-                                                  .bit = std::uint32_t{1} << l,
-                                                  .thick_least = kThickLeast,
-                                                  .count = shape.width - 2});
+            const LedgeSeen seen =
+                kernels.landscape->ledge({.lean = lean_.data() + first + 1,
+                                          .highest = highest_.data() + center + 1,
+                                          .raw = input.raw + center + 1,
+                                          .moved = input.moved + center + 1,
+                                          .raw_top = raw_top_.data() + first + 1,
+                                          .top = top + first + 1,
+                                          .bottom = top - plane + first + 1,
+                                          .bit = std::uint32_t{1} << l,
+                                          .thick_least = kThickLeast,
+                                          .count = shape.width - 2});
             any_here |= seen.leans;
             any_later |= seen.is_lower;
         }

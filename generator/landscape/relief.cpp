@@ -77,13 +77,13 @@ void mix_columns(float* out, const float* values, const SplineShares& shares,
     std::int32_t column = 0;
     if (first_eighth > 0) {
         std::array<float, kSplineCell> cell;
-        kernels.mix_cells(cell.data(), values++, shares, 1);
+        kernels.landscape->mix_cells(cell.data(), values++, shares, 1);
         column = kSplineCell - first_eighth;
         std::copy(cell.begin() + first_eighth, cell.end(), out);
     }
     if (column < width) {
-        kernels.mix_cells(out + column, values, shares,
-                          (width - column + kSplineCell - 1) / kSplineCell);
+        kernels.landscape->mix_cells(out + column, values, shares,
+                                     (width - column + kSplineCell - 1) / kSplineCell);
     }
 }
 
@@ -254,11 +254,12 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
                              });
     for (std::size_t t = 0; t < tile_count; ++t) {
         Tile& tile = tiles[t];
-        kernels.valleys(tile.places, near_.data(), static_cast<std::int32_t>(near_.size()),
-                        {.inverse_reach_square = 1.0F / (reach * reach),
-                         .e2 = 0.0025F * constants.valley * constants.valley,
-                         .half_valley = 0.5F * constants.valley,
-                         .plateau = constants.plateau});
+        kernels.landscape->valleys(tile.places, near_.data(),
+                                   static_cast<std::int32_t>(near_.size()),
+                                   {.inverse_reach_square = 1.0F / (reach * reach),
+                                    .e2 = 0.0025F * constants.valley * constants.valley,
+                                    .half_valley = 0.5F * constants.valley,
+                                    .plateau = constants.plateau});
         for (std::size_t n = 0; n < kVectorPad; ++n) {
             float* const value = lattice_.data() + tile.at[n];
             value[plane] = tile.places.weight[n] > 0

@@ -36,8 +36,8 @@ ResistanceWalk::ResistanceWalk(float* height, float* rest, const float* over, st
 bool ResistanceWalk::pass(const LayerResistance& layer, const LayerHeights& layers, std::size_t k,
                           const RowKernels& kernels) {
     const float* const top = layers.first + k * layers.plane;
-    return kernels.resist(height_, rest_, k > 0 ? top - layers.plane : nullptr, top, layer,
-                          static_cast<std::int32_t>(count_));
+    return kernels.landscape->resist(height_, rest_, k > 0 ? top - layers.plane : nullptr, top,
+                                     layer, static_cast<std::int32_t>(count_));
 }
 
 }  // namespace terrane
