@@ -287,7 +287,7 @@ struct Server::Impl {
         add_tiles3d_routes(router, routes);
         add_picture_routes(router, routes);
         add_texture_routes(router, routes);
-        add_openapi_route(router);
+        add_openapi_route(router, options.tileset_levels);
         add_viewer_routes(router, options.viewer_files);
     }
 

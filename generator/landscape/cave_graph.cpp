@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 namespace terrane {
 namespace {
@@ -188,15 +189,18 @@ void CaveGraph::build(const CaveConstants& constants, const FoldConstants& folds
             }
         }
     };
+    // Nothing is known until all is: memory may run out on the way.
+    const std::int64_t known_width = std::exchange(width_, 0);
+    const std::int64_t known_length = std::exchange(length_, 0);
     std::swap(cells_, before_);
     cells_.resize(static_cast<std::size_t>(width * length));
     for (std::int64_t j = j0; j <= j1; ++j) {
         for (std::int64_t i = i0; i <= i1; ++i) {
             CaveCell& cell = cells_[static_cast<std::size_t>((j - j0) * width + (i - i0))];
-            if (i >= first_i_ && i < first_i_ + width_ && j >= first_j_ && j < first_j_ + length_) {
-                std::swap(
-                    cell,
-                    before_[static_cast<std::size_t>((j - first_j_) * width_ + (i - first_i_))]);
+            if (i >= first_i_ && i < first_i_ + known_width && j >= first_j_ &&
+                j < first_j_ + known_length) {
+                std::swap(cell, before_[static_cast<std::size_t>((j - first_j_) * known_width +
+                                                                 (i - first_i_))]);
             } else {
                 fill(cell, i, j);
             }

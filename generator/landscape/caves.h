@@ -14,7 +14,7 @@
 // A tube is kTubePoints points along a bent line. At a column each piece is a capsule: with q the
 // distance^2 on the map, r the radius made uneven by noise, hh = sqrt(r^2 - q) and m the slope of
 // the piece, the cave reaches hh * sqrt(1 + m^2) up from the axis but not beyond the piece's ends
-// and hh, and kFlatFloor of it down, so that one can walk.
+// and hh, and 0.62 of it down, so that one can walk.
 #pragma once
 
 #include "generator/landscape/fold.h"

@@ -25,7 +25,6 @@ CellPlace cell_place(std::int64_t coordinate, std::uint64_t frequency) {
             .fraction = static_cast<float>(static_cast<std::uint32_t>(low >> 40U)) * 0x1p-24F};
 }
 
-/// The points of the 3 x 3 cells around each column's, for rows whose cell is `cell_z`.
 /// One random point of a cell, from its hash.
 struct CellPoint {
     float x = 0;
@@ -39,6 +38,7 @@ CellPoint point_of(std::uint64_t hash, std::int64_t dx, std::int64_t dz) {
             .z = static_cast<float>(dz) + (0.25F + 0.5F * z)};
 }
 
+/// The points of the 3 x 3 cells around each column's, for rows whose cell is `cell_z`.
 void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers,
                  std::int64_t cell_z) {
     const std::vector<std::int64_t>& cells = buffers.cells;

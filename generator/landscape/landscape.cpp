@@ -262,7 +262,9 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
         if (k > 0) {
             build_blends(region, constants, k, kernels);
         }
-        shows[k] = shows[k] || any_below(buried_.data(), region.y256.data() + k * plane);
+        // Where the whole stack ends below the ground, what is on it flows as its last layer.
+        shows[k] = shows[k] || k + 1 == layers ||
+                   any_below(buried_.data(), region.y256.data() + k * plane);
     }
     place_elements(region, *world_, shown_.data(), plots, kernels);
     for (const PlacedElement& placed : region.elements) {

@@ -2,6 +2,7 @@
 
 #include "generator/landscape/numbers.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_file.h"
 
 #include <algorithm>
 #include <bit>
@@ -61,7 +62,7 @@ void dilate(std::vector<float>& highest, std::vector<float>& rows, std::vector<f
     dilate_by(highest, static_cast<std::size_t>(shape.stride()));
 }
 
-constexpr std::int32_t kReachMax = 6;  ///< columns: a world file asks for no more
+constexpr auto kReachMax = static_cast<std::int32_t>(kOverhangMax);  ///< columns
 
 /// Distances to columns so far away along x and z.
 struct Distances {

@@ -4,9 +4,9 @@
 // top stands above the column: of all lip columns j within `overhang`,
 //
 //     e = min over j of dist / (reach_j + .5);  j is a lip if raw_j - Us_j >= A_k (raw height of
-//     the layer's top here), pf_j >= .27, fine_j >= -1, |Us_j - Us| <= .4 dist reach = overhang *
-//     clamp01(.6 + 1.6 noise) e < 1: rock from top - t to top, t = .45 thickness (1 - e^2) + 1.2,
-//     top lowered by 1.5 e
+//         the layer's top here), pf_j >= .27, fine_j >= -1, |Us_j - Us| <= .4 dist
+//     reach = overhang * clamp01(.6 + 1.6 noise)
+//     e < 1: rock from top - t to top, t = .45 thickness (1 - e^2) + 1.2, top lowered by 1.5 e
 //
 // A dilation of the lips, so that everything hangs together with what it grows from. The air below
 // goes down to the ground; a gap under kGapLeast is filled. One overhang a column, level 0 only.

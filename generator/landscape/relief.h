@@ -11,11 +11,11 @@
 //
 // The sum is a smooth minimum of distances, so that valleys meet in crests (Genevaux et al. 2013)
 // without sorting or a pass over the map. Only reaches of nodes at most kRiverReachCells away come
-// so near; some 4 x 4 points of the lattice at a time look at those whose boxes come near one of
-// them. Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient; so do they take
-// how far a place is moved before a river is sought. Levels whose step exceeds a quarter of the
-// valley take the value of one point; levels whose step exceeds the valley take the mean between
-// river and crest.
+// so near: four tiles of at most sixteen lattice points look for them together, by their boxes.
+// Columns take the uniform cubic B-spline of 4 x 4 points, and its gradient; so do they take how
+// far a place is moved before a river is sought. Levels whose step exceeds a quarter of the valley
+// take the value of one point; levels whose step exceeds the valley take the mean between river and
+// crest.
 #pragma once
 
 #include "generator/landscape/river_graph.h"

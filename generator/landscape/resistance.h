@@ -4,8 +4,10 @@
 // the stack, a voxel of layer k costs g_k of raw height, little where the rock resists. So a hard
 // layer stands as a cliff, a soft one lies as a bench, through every fold and fault.
 //
-//     a = (2 hardness - 1) * cliffs;  rho = (1 + a) / (1 - a);  g_k = (D / sum_j(T_j/rho_j)) /
-//     rho_k a = raw - Us (Us: what structure did to the rock there); y = 0; from the bottom up:
+//     a = (2 hardness - 1) * cliffs;  rho = (1 + a) / (1 - a)
+//     g_k = (D / sum_j(T_j / rho_j)) / rho_k
+//
+//     a = raw - Us (Us: what structure did to the rock there); y = 0; from the bottom up:
 //         lim = (H_k - H_k-1) g_k; m = clamp(a, 0, lim); e = rho > 1 ? .3 min(1, rho - 1) : 0
 //         m = m m (1 + e) / (m + e lim)          concave, or every relic cap is a pyramid
 //         y += m / g_k; a -= lim

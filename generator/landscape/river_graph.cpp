@@ -89,10 +89,6 @@ class NodeGrid {
           width_(range.last_i - range.first_i + 1 + 2 * kMargin),
           length_(range.last_j - range.first_j + 1 + 2 * kMargin),
           nodes_(nodes.nodes) {
-        nodes.range = {.first_i = first_i_,
-                       .last_i = first_i_ + width_ - 1,
-                       .first_j = first_j_,
-                       .last_j = first_j_ + length_ - 1};
         nodes_.clear();
         nodes_.reserve(static_cast<std::size_t>(width_ * length_));
         const CellRange& known = before.range;
@@ -110,6 +106,10 @@ class NodeGrid {
                 nodes_.back().downstream = kSink;
             }
         }
+        nodes.range = {.first_i = first_i_,
+                       .last_i = first_i_ + width_ - 1,
+                       .first_j = first_j_,
+                       .last_j = first_j_ + length_ - 1};
         find_downstream();
         for (int step = 0; step < kUpstreamSteps; ++step) {
             accumulate();
@@ -218,11 +218,13 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
     const std::int64_t length = range.last_j - range.first_j + 1;
     TERRANE_ASSERT(width > 0 && length > 0 &&
                    static_cast<std::size_t>(width * length) <= kNodesMax);
-    std::swap(nodes_, before_);
-    const NodeGrid nodes(nodes_, before_, constants, range);
-    range_ = range;
+    // Nothing is known until all is: memory may run out on the way.
+    range_ = {};
     reaches_.clear();
     boxes_.clear();
+    std::swap(nodes_, before_);
+    nodes_.range = {};
+    const NodeGrid nodes(nodes_, before_, constants, range);
     for (std::int64_t j = range.first_j; j <= range.last_j; ++j) {
         for (std::int64_t i = range.first_i; i <= range.last_i; ++i) {
             const RiverNode& node = nodes.at(i, j);
@@ -247,6 +249,7 @@ void RiverGraph::build(const RiverConstants& constants, const CellRange& range) 
                               .z_max = z + reach.z_max});
         }
     }
+    range_ = range;
 }
 
 }  // namespace terrane

@@ -7,8 +7,7 @@
 // - One node in each cell of a staggered lattice, `valley` columns apart, somewhere inside it. Its
 //   level is a smooth potential plus a little chance.
 // - It flows to the lowest of its six neighbours if that is lower, else it is a sink: a lake, or
-// sea
-//   below the sea level. So rivers only run downhill, join, and never cross.
+//   the sea, below its level. So rivers only run downhill, join, and never cross.
 // - acc = 1, and kUpstreamSteps times acc = 1 + the sum of acc upstream. The measure of a river's
 //   width at a node is sqrt(acc - 1): a source begins at 0.
 // - A reach is a quadratic curve from a node to the one downstream, in kReachSegments straight
@@ -20,6 +19,7 @@
 #include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/noise.h"
 #include "generator/world/world_definition.h"
+#include "protocol/base/check.h"
 
 #include <array>
 #include <cstdint>
@@ -130,6 +130,8 @@ class RiverGraph {
     /// floats, in columns from the first reach's node: `box` must have some slack.
     template <typename Use>
     void for_each_meeting(const CellRange& range, const ReachBox& box, Use use) const {
+        TERRANE_DEBUG_ASSERT(range.first_i >= range_.first_i && range.last_i <= range_.last_i &&
+                             range.first_j >= range_.first_j && range.last_j <= range_.last_j);
         const std::int64_t width = range_.last_i - range_.first_i + 1;
         for (std::int64_t j = range.first_j; j <= range.last_j; ++j) {
             const auto row = static_cast<std::size_t>((j - range_.first_j) * width);

@@ -30,6 +30,7 @@
 namespace terrane {
 namespace {
 
+static_assert(kCellUnits == kUnitsPerVoxel && kCellDistanceMax256 == kDistanceMax256);
 constexpr std::int64_t kRangeVoxelsMax = std::int64_t{1} << 22;
 
 /// The solid end of the first crossed level edge, in a fixed order, by the cell's solid corners.

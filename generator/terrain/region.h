@@ -16,7 +16,8 @@
 
 namespace terrane {
 
-/// `width` x `length` columns from (x0, z0) on, 2^lod voxels apart. Sides 1..kRectangleSideMax - 2.
+/// `width` x `length` columns from (x0, z0) on, 2^lod voxels apart. Sides 1..kRectangleSideMax - 2
+/// (of landscapes - 14, for what overhangs look at).
 struct ColumnRectangle {
     std::int64_t x0 = 0;
     std::int64_t z0 = 0;
@@ -40,6 +41,7 @@ struct PlacedElement {
     const Element& element() const { return plotted->element; }
 };
 
+/// A bit of Region::irregular.
 inline constexpr std::uint8_t kElementStands = 2;
 
 /// A worker's rasters and buffers; refilled by build_region.
@@ -62,7 +64,7 @@ struct Region {
     /// K planes: where each layer's blend into the one right below ends, in 1/256 voxel.
     std::vector<std::int32_t> middle;
     /// Per column of shape: bit 0 where a layer pinches out or a blend reaches its layer's top,
-    /// kElementStands where an element stands that lifts.
+    /// kElementStands where an element stands that does not just replace.
     std::vector<std::uint8_t> irregular;
 
     NoiseBuffers noise_buffers;

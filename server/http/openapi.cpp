@@ -153,15 +153,21 @@ Json integer(std::int64_t least, std::int64_t most, std::int64_t example) {
             {"examples", Json::array({example})}};
 }
 
+/// What the document says of the world that is served.
+struct OpenApiContext {
+    std::string content_id;
+    std::int32_t tileset_levels = 0;
+};
+
 /// What a name of a path or query may be.
-Json schema_of(std::string_view name, const Described& route, const std::string& content_id) {
+Json schema_of(std::string_view name, const Described& route, const OpenApiContext& context) {
     constexpr std::int64_t kInt32Min = std::numeric_limits<std::int32_t>::min();
     constexpr std::int64_t kInt32Max = std::numeric_limits<std::int32_t>::max();
     constexpr std::int64_t kColumnMax = kColumnCoordinateLimit - 1;
     if (name == "W") {
         return {{"type", "string"},
                 {"pattern", "^[0-9a-f]{32}$"},
-                {"examples", Json::array({content_id})}};
+                {"examples", Json::array({context.content_id})}};
     }
     if (name == "name") {
         return {{"type", "string"}};
@@ -170,7 +176,7 @@ Json schema_of(std::string_view name, const Described& route, const std::string&
         return integer(0, levels_supported() - 1, 0);
     }
     if (name == "level") {
-        return integer(0, levels_supported() - 1, 0);
+        return integer(0, context.tileset_levels - 1, 0);
     }
     if (name == "zoom") {
         return integer(0, kMapZoomMax, 0);
@@ -201,20 +207,20 @@ std::vector<std::string> names_in(std::string_view pattern) {
     return names;
 }
 
-Json parameters_of(const Described& route, const std::string& content_id) {
+Json parameters_of(const Described& route, const OpenApiContext& context) {
     Json parameters = Json::array();
     for (const std::string& name : names_in(full_path(route))) {
         parameters.push_back({{"name", name},
                               {"in", "path"},
                               {"required", true},
-                              {"schema", schema_of(name, route, content_id)}});
+                              {"schema", schema_of(name, route, context)}});
     }
     for (const std::string_view name : route.query) {
         if (!name.empty()) {
             parameters.push_back({{"name", name},
                                   {"in", "query"},
                                   {"required", false},
-                                  {"schema", schema_of(name, route, content_id)}});
+                                  {"schema", schema_of(name, route, context)}});
         }
     }
     return parameters;
@@ -261,9 +267,9 @@ Json responses_of(const Described& route) {
     return responses;
 }
 
-Json operation_of(const Described& route, const std::string& content_id) {
+Json operation_of(const Described& route, const OpenApiContext& context) {
     Json operation = {{"tags", Json::array({route.tag})}, {"summary", route.summary}};
-    if (Json parameters = parameters_of(route, content_id); !parameters.empty()) {
+    if (Json parameters = parameters_of(route, context); !parameters.empty()) {
         operation["parameters"] = std::move(parameters);
     }
     operation["responses"] = responses_of(route);
@@ -313,7 +319,9 @@ std::vector<std::string> described_paths() {
     return paths;
 }
 
-std::string openapi_json(const Router& router) {
+std::string openapi_json(const Router& router, std::int32_t tileset_levels) {
+    const OpenApiContext context = {.content_id = router.content_id(),
+                                    .tileset_levels = tileset_levels};
     std::vector<std::string> served = router.paths();
     served.emplace_back(kOwnPath);
     served.emplace_back("/");
@@ -321,7 +329,7 @@ std::string openapi_json(const Router& router) {
     for (const Described& route : kDescribed) {
         const std::string path = full_path(route);
         if (std::find(served.begin(), served.end(), path) != served.end()) {
-            paths[path]["get"] = operation_of(route, router.content_id());
+            paths[path]["get"] = operation_of(route, context);
         }
     }
     const Json json = {
@@ -342,13 +350,13 @@ std::string openapi_json(const Router& router) {
     return json.dump(2) + "\n";
 }
 
-void add_openapi_route(Router& router) {
-    router.add(
-        {.path = std::string(kOwnPath),
-         .handler = [response = http_ok("application/json", http_body(openapi_json(router)))](
-                        const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-             respond(response);
-         }});
+void add_openapi_route(Router& router, std::int32_t tileset_levels) {
+    router.add({.path = std::string(kOwnPath),
+                .handler = [response = http_ok("application/json",
+                                               http_body(openapi_json(router, tileset_levels)))](
+                               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
+                    respond(response);
+                }});
 }
 
 }  // namespace terrane

@@ -178,7 +178,7 @@ void HttpSession::process(Clock::time_point now) {
             return;
         }
         byte_rate_.refill(now);
-        if (!byte_rate_.has()) {
+        if (!draining_ && !byte_rate_.has()) {
             wake_at_ = byte_rate_.ready_at();
             return;
         }

@@ -67,8 +67,8 @@ struct HttpContext {
     HttpTimeouts timeouts;
     WebSocketUpgrade websocket;
     const Log* requests_log = nullptr;  ///< gets a line a request, if not null
-    /// Asked what the bearer of a token may take, when a connection shows another than before;
-    /// empty: no caps.
+    /// Asked what the bearer of a token may take, when a connection shows another than before: it
+    /// keeps these caps while it shows the same one. Empty: no caps.
     std::function<HttpRates(std::string_view token)> rates_of = {};
 };
 

@@ -56,14 +56,24 @@ class RequestLogTest : public testing::Test {
         server_ = *std::move(server);
     }
 
+    void TearDown() override {
+        if (!has_taken_) {  // a failed test must not leave the capturer to the next
+            testing::internal::GetCapturedStderr();
+        }
+    }
+
     /// Ends the server, so that nothing more is logged.
     std::string logged() {
         server_->stop(50ms);
+        has_taken_ = true;
         return testing::internal::GetCapturedStderr();
     }
 
     const Log log_{LogFormat::text, LogLevel::debug};
     std::unique_ptr<Server> server_;
+
+  private:
+    bool has_taken_ = false;
 };
 
 TEST_F(RequestLogTest, NativeRequestsAndFailuresHaveNumbers) {

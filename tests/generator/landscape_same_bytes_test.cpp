@@ -113,6 +113,42 @@ TEST_P(LandscapeSameBytes, WhereStacksMadeApartShareColumns) {
     }
 }
 
+TEST_P(LandscapeSameBytes, ForEveryKernelSetOnFarLevels) {
+    const auto world = load_shipped_world(GetParam());
+    ASSERT_NE(world, nullptr);
+    StackGenerator generator(*world);
+    for (const std::int32_t lod : {1, 4, 6, 8, 13}) {
+        const StackPos position{.lod = lod, .x = -2, .z = 3};
+        Stack chosen;
+        ASSERT_TRUE(generator.generate(chosen, position));
+        for (const KernelSet& set : available_kernel_sets()) {
+            StackGenerator other(*world, *set.kernels);
+            Stack stack;
+            ASSERT_TRUE(other.generate(stack, position));
+            EXPECT_EQ(stack, chosen) << set.name << ", level " << lod;
+        }
+    }
+}
+
+TEST(LandscapeSameBytes, WhereTheWholeStackIsFoldedBelowTheWorld) {
+    WorldDefinition definition = load_shipped_world("fold")->definition;
+    definition.structure.fold = 900;
+    auto world = World::build(definition);
+    ASSERT_TRUE(world) << world.error().message;
+    StackGenerator generator(*world);
+    std::size_t covers = 0;
+    for (std::int64_t x = 0; x < 12 * kSide; x += kSide) {
+        const Place place{x, -x};
+        const std::string once = to_hex(hash_area(generator, place, 96, false));
+        EXPECT_EQ(to_hex(hash_area(generator, place, 16, true)), once) << x;
+        ColumnSet set;
+        ASSERT_TRUE(
+            generator.generate(set, {.x0 = place.x, .z0 = place.z, .width = 1, .length = 1}));
+        covers += set.palette[set.columns.limits.front().palette_id].kind == PaletteKind::vein;
+    }
+    EXPECT_GT(covers, 0U);  // soil down to the bottom of the world
+}
+
 INSTANTIATE_TEST_SUITE_P(Worlds, LandscapeSameBytes,
                          testing::Values("canyon", "karst", "fold", "range", "alpine", "coast"),
                          [](const auto& world) { return std::string(world.param); });

@@ -126,18 +126,24 @@ TEST(OpenApi, DescribesEveryRouteOfTheTableAndNoOther) {
     add_tiles3d_routes(router, context);
     add_picture_routes(router, context);
     add_texture_routes(router, context);
-    add_openapi_route(router);
+    add_openapi_route(router, 9);
     add_viewer_routes(router, {});
     std::set<std::string> table;
     for (const std::string& path : router.paths()) {
         table.insert(path == "/index.html" ? "/" : path);
     }
-    const Json document = Json::parse(openapi_json(router));
+    const Json document = Json::parse(openapi_json(router, 9));
     std::set<std::string> documented;
     for (const auto& [path, item] : document["paths"].items()) {
         documented.insert(path);
     }
     EXPECT_EQ(documented, table);
+    const Json& tile = document["paths"]["/v1/w/{W}/3dtiles/content/{level}/{x}/{y}.glb"];
+    const Json& parameters = tile["get"]["parameters"];
+    const auto level = std::find_if(parameters.begin(), parameters.end(),
+                                    [](const Json& one) { return one["name"] == "level"; });
+    ASSERT_NE(level, parameters.end());
+    EXPECT_EQ((*level)["schema"]["maximum"], 8);
     const auto all = described_paths();
     EXPECT_EQ(std::set<std::string>(all.begin(), all.end()), table);
 }

@@ -228,6 +228,7 @@ Result<LoadResult> LoadRun::run() {
     handlers.opened = [this](StreamLoop::StreamId id) {
         Viewer& viewer = viewers_[id];
         viewer.is_open = true;
+        viewer.is_hung = false;  // if it took longer than its patience, it is waited for again
         viewer.client->open(Clock::now());
         flush(viewer);
     };

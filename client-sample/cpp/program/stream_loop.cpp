@@ -117,7 +117,8 @@ struct StreamLoop::State {
             read_tls(id);
             return;
         }
-        // Waiting takes no buffer, so thousands of idle connections hold none.
+        // Waiting takes no buffer, so thousands of idle connections hold none. (Those by TLS do,
+        // kReceiveBytes each: what waits may be inside the TLS engine.)
         streams[id]->socket.async_wait(
             tcp::socket::wait_read, [this, id, stream = streams[id]](error_code error) {
                 if (stream->is_ended) {

@@ -9,12 +9,11 @@
 namespace terrane::TERRANE_KERNEL_SET {
 namespace {
 
-constexpr std::int32_t kUnits = 256;        ///< kUnitsPerVoxel
-constexpr std::int32_t kMost = 4 * kUnits;  ///< kDistanceMax256
+constexpr std::int32_t kUnits = kCellUnits;
 
 std::int32_t clamped_size(std::int32_t distance) {
     const std::int32_t size = distance < 0 ? -distance : distance;
-    return size < kMost ? size : kMost;
+    return size < kCellDistanceMax256 ? size : kCellDistanceMax256;
 }
 
 /// The corners of a block of cells.

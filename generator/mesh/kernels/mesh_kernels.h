@@ -9,6 +9,8 @@ namespace terrane {
 /// Cells are made so many at a time, in blocks of kCellBlock.
 inline constexpr std::int32_t kCellBatch = 64;
 inline constexpr std::int32_t kCellBlock = 16;
+inline constexpr std::int32_t kCellUnits = 256;                      ///< kUnitsPerVoxel
+inline constexpr std::int32_t kCellDistanceMax256 = 4 * kCellUnits;  ///< kDistanceMax256
 
 /// What surface-nets cells become. Their columns are (x, z), (x+1, z), (x, z+1), (x+1, z+1); their
 /// corners those four at the floor, then at the ceiling.
