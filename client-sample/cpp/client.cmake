@@ -19,7 +19,7 @@ install(TARGETS terrane_base terrane_wire terrane_generator terrane_client_libra
 install(CODE "set(terrane_source \"${CMAKE_SOURCE_DIR}\")
     set(terrane_include \"${CMAKE_INSTALL_INCLUDEDIR}\")" COMPONENT client)
 install(SCRIPT ${CMAKE_CURRENT_LIST_DIR}/package/install_headers.cmake COMPONENT client)
-install(TARGETS terrane-client RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+install(TARGETS terrane terrane-client RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/package/terraneConfig.cmake.in
     ${CMAKE_BINARY_DIR}/package/terraneConfig.cmake
     INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/terrane

@@ -341,7 +341,9 @@ void add_serve_command(CLI::App& app, int& exit_code) {
         "SIGHUP reads certificate, key and tokens again. SIGTERM and SIGINT let clients finish.\n"
         "Examples:\n"
         "  terrane serve --world generator/worlds/basin.toml --data /tmp/basin\n"
-        "  terrane serve --print-config > server.toml; terrane serve --config server.toml");
+        "  terrane serve --print-config > server.toml    then fill in world and data, and\n"
+        "  terrane serve --config server.toml\n"
+        "Exit code: 0 ended by a signal, 1 cannot serve, 2 wrong use.");
     serve->callback([flags, options, &exit_code] {
         std::vector<bool> given;
         given.reserve(options.size());

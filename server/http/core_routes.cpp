@@ -155,8 +155,7 @@ std::string world_json(const RouteContext& context, const std::string& versioned
         if (!material.texture.empty()) {
             entry["texture"] = versioned_prefix + "/textures/" + material.texture;
         }
-        entry["solid"] =
-            material.kind != MaterialKind::void_ && material.kind != MaterialKind::cave;
+        entry["solid"] = is_solid(material.kind);
         materials.push_back(std::move(entry));
     }
     Json links = {{"self", "/v1/world"}, {"content", versioned_prefix}};

@@ -368,7 +368,7 @@ TEST_F(Get, WrongUseIsExitCode2) {
 TEST_F(Get, HelpTeachesWithExamples) {
     const auto outcome = run({"get", "--help"});
     EXPECT_EQ(outcome.exit_code, 0);
-    EXPECT_NE(outcome.out.find("terrane-client get --at -1,0,5"), std::string::npos);
+    EXPECT_NE(outcome.out.find("terrane-client get --at -1,2,0"), std::string::npos);
     EXPECT_NE(outcome.out.find("0..17"), std::string::npos);
 }
 

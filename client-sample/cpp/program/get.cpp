@@ -329,7 +329,7 @@ void add_get_command(CLI::App& app, int& exit_code) {
         "Exit code: 0 all came and decoded, 1 something did not, 2 wrong use.\n"
         "Examples:\n"
         "  terrane-client get --at 0,0,0                            one chunk, as a table\n"
-        "  terrane-client get --at -1,0,5 --at 0,0,5 -o chunks/     two of them, into a folder\n"
+        "  terrane-client get --at -1,2,0 --at 0,2,0 -o chunks/     two of them, into a folder\n"
         "  terrane-client get --at 0,1,0 -o hill.draco --obj        and hill.draco.obj for a 3D "
         "program\n"
         "  terrane-client get --at 0,0,0 --format columns --json    for programs");

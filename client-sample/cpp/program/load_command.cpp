@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -23,7 +24,7 @@ constexpr std::uint32_t kLoadRadiusMax = 32;
 
 /// As CLI11 gives them, before they are understood.
 struct LoadFlags {
-    std::string server = "127.0.0.1:7777";
+    std::string server;
     std::string move = "walk";
     std::string path;
     std::string format = "draco";
@@ -58,7 +59,10 @@ Result<std::string> read_text(const std::string& path) {
 
 Result<LoadOptions> understood(const LoadFlags& flags) {
     LoadOptions options = flags.options;
-    const auto address = parse_address(flags.server);
+    const bool is_by_http = flags.ws || flags.http;
+    const auto address = parse_address(!flags.server.empty() ? flags.server
+                                       : is_by_http          ? "127.0.0.1:8080"
+                                                             : "127.0.0.1:7777");
     if (!address) {
         return fail(address.error().code, "--server: " + address.error().message);
     }
@@ -82,6 +86,8 @@ Result<LoadOptions> understood(const LoadFlags& flags) {
         options.path = std::make_shared<const std::vector<PathPoint>>(std::move(*path));
         options.movements = {MovementKind::path};
     }
+    // By half of the time at the latest all have come.
+    options.ramp_seconds = std::min(options.ramp_seconds, options.seconds / 2);
     options.at_x = flags.at[0];
     options.at_z = flags.at[1];
     options.client.format = flags.format == "columns"  ? ChunkFormat::columns
@@ -178,9 +184,10 @@ void add_load_command(CLI::App& app, int& exit_code) {
     const auto flags = std::make_shared<LoadFlags>();
     CLI::App* load =
         app.add_subcommand("load", "Many clients at once: what does this server bear?");
-    load->add_option("--server", flags->server, "Where the server listens")
-        ->type_name("HOST:PORT")
-        ->capture_default_str();
+    load->add_option("--server", flags->server,
+                     "Where the server listens; 127.0.0.1:7777 if absent, with --ws and --http "
+                     "127.0.0.1:8080")
+        ->type_name("HOST:PORT");
     load->add_option("--clients", flags->options.clients, "How many")
         ->check(CLI::Range(std::size_t{1}, kLoadClientsMax))
         ->capture_default_str();
@@ -189,7 +196,8 @@ void add_load_command(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(0.1, 86400.0))
         ->capture_default_str();
     load->add_option("--ramp", flags->options.ramp_seconds,
-                     "Seconds over which clients come, one after the other")
+                     "Seconds over which clients come, one after the other; at most half of "
+                     "--seconds")
         ->check(CLI::Range(0.0, 86400.0))
         ->capture_default_str();
     auto* ws =
