@@ -234,6 +234,10 @@ const RatioEntry kExtendTuned{{.what = "the same / per-voxel Perlin tuned as har
                                .numerators = kEight,
                                .denominator = "perlin_tuned",
                                .bar = 0.6}};
+const RatioEntry kExtendB3{{.what = "extend the paper's B3 online to chunks / per-voxel Perlin",
+                            .numerators = {"extend_chunks/B3"},
+                            .denominator = "perlin_per_voxel",
+                            .bar = 0.06}};
 const RatioEntry kStackPlain{
     {.what = "stack to limits, 12 layers, 256 high, no elements / per-voxel Perlin",
      .numerators = {"stack_limits/level0/plain"},

@@ -71,7 +71,7 @@ TEST_P(LandscapeLevels, AreTheSameInRectanglesOfAnySize) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, LandscapeLevels,
-                         testing::Values("canyon", "karst", "range", "alpine", "coast"),
+                         testing::Values("canyon", "karst", "fold", "range", "alpine", "coast"),
                          [](const auto& world) { return std::string(world.param); });
 
 }  // namespace

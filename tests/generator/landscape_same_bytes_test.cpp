@@ -113,23 +113,6 @@ TEST_P(LandscapeSameBytes, WhereStacksMadeApartShareColumns) {
     }
 }
 
-TEST_P(LandscapeSameBytes, ForEveryKernelSetOnFarLevels) {
-    const auto world = load_shipped_world(GetParam());
-    ASSERT_NE(world, nullptr);
-    StackGenerator generator(*world);
-    for (const std::int32_t lod : {1, 4, 6, 8, 13}) {
-        const StackPos position{.lod = lod, .x = -2, .z = 3};
-        Stack chosen;
-        ASSERT_TRUE(generator.generate(chosen, position));
-        for (const KernelSet& set : available_kernel_sets()) {
-            StackGenerator other(*world, *set.kernels);
-            Stack stack;
-            ASSERT_TRUE(other.generate(stack, position));
-            EXPECT_EQ(stack, chosen) << set.name << ", level " << lod;
-        }
-    }
-}
-
 TEST(LandscapeSameBytes, WhereTheWholeStackIsFoldedBelowTheWorld) {
     WorldDefinition definition = load_shipped_world("fold")->definition;
     definition.structure.fold = 900;

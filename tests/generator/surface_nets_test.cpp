@@ -389,7 +389,7 @@ TEST_P(SurfaceNetsOf, EveryInstructionSetMakesTheSameMesh) {
     const Mesh chosen = mesh_of(letters_, drawn, heights);
     ASSERT_GT(chosen.vertex_count(), std::size_t{4} * kCellBatch);
     for (const KernelSet& set : available_kernel_sets()) {
-        SurfaceNetsMesher mesher(letters_.definition(), mesh_kernels_beside(*set.kernels));
+        SurfaceNetsMesher mesher(letters_.definition(), *set.kernels->mesh);
         Mesh mesh;
         mesher.mesh(mesh, drawn, heights);
         EXPECT_EQ(mesh.positions256, chosen.positions256) << set.name;

@@ -3,6 +3,10 @@
 
 namespace terrane {
 
+namespace kernels_native {
+extern const MeshKernels kMeshKernels;
+}
+
 const MeshKernels& chosen_mesh_kernels() {
     return kernels_native::kMeshKernels;
 }

@@ -33,32 +33,7 @@ struct MeshKernels {
                           std::int32_t count);
 };
 
-struct RowKernels;
-
-/// Those of the instruction set that the row kernels are of.
-const MeshKernels& mesh_kernels_beside(const RowKernels& row_kernels);
-
-/// Those beside chosen_row_kernels().
+/// Of the instruction set that the row kernels are chosen from too (RowKernels::mesh).
 const MeshKernels& chosen_mesh_kernels();
-
-namespace kernels_scalar {
-extern const MeshKernels kMeshKernels;
-}
-
-namespace kernels_sse2 {
-extern const MeshKernels kMeshKernels;
-}
-
-namespace kernels_avx2 {
-extern const MeshKernels kMeshKernels;
-}
-
-namespace kernels_avx512 {
-extern const MeshKernels kMeshKernels;
-}
-
-namespace kernels_native {
-extern const MeshKernels kMeshKernels;
-}
 
 }  // namespace terrane

@@ -333,6 +333,7 @@ const RowKernels kKernels = {.gradients = gradients,
                              .blends = blends,
                              .plain_columns = plain_columns,
                              .element_tile = element_tile,
-                             .landscape = &kLandscapeKernels};
+                             .landscape = &kLandscapeKernels,
+                             .mesh = &kMeshKernels};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -67,6 +67,8 @@ struct PlainRow {
     std::int32_t layers = 0;
 };
 
+struct MeshKernels;
+
 struct RowKernels {
     /// Gradients of `count` lattice points of one lattice row, from the hashes of their columns:
     /// the top four bits of mix(hash ^ row_value) number the sixteen unit vectors. Whole blocks.
@@ -99,31 +101,37 @@ struct RowKernels {
     void (*element_tile)(float* thickness, float x, float z, float step,
                          const SegmentTable& segments, float inverse_half_side, float thick);
     const LandscapeKernels* landscape;
+    const MeshKernels* mesh;  ///< generator/mesh/kernels/mesh_kernels.h
 };
 
 namespace kernels_scalar {
 extern const RowKernels kKernels;
 extern const LandscapeKernels kLandscapeKernels;
+extern const MeshKernels kMeshKernels;
 }  // namespace kernels_scalar
 
 namespace kernels_sse2 {
 extern const RowKernels kKernels;
 extern const LandscapeKernels kLandscapeKernels;
+extern const MeshKernels kMeshKernels;
 }  // namespace kernels_sse2
 
 namespace kernels_avx2 {
 extern const RowKernels kKernels;
 extern const LandscapeKernels kLandscapeKernels;
+extern const MeshKernels kMeshKernels;
 }  // namespace kernels_avx2
 
 namespace kernels_avx512 {
 extern const RowKernels kKernels;
 extern const LandscapeKernels kLandscapeKernels;
+extern const MeshKernels kMeshKernels;
 }  // namespace kernels_avx512
 
 namespace kernels_native {
 extern const RowKernels kKernels;
 extern const LandscapeKernels kLandscapeKernels;
+extern const MeshKernels kMeshKernels;
 }  // namespace kernels_native
 
 }  // namespace terrane
