@@ -11,10 +11,15 @@
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <ctime>
+#include <iterator>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -111,30 +116,75 @@ void cold_level(benchmark::State& state) {
     }
 }
 
-/// `workers` threads, each with a chain of its own, share 64 stacks: each takes a stretch, as the
-/// regions of `preseed` are shared out, so that no plot is made twice.
-void workers_whole(benchmark::State& state) {
-    const auto workers = static_cast<std::int64_t>(state.range(0));
-    constexpr std::int64_t kStacks = 64;
-    std::vector<std::unique_ptr<Chain>> chains;
-    for (std::int64_t w = 0; w < workers; ++w) {
-        chains.push_back(std::make_unique<Chain>("basin"));
-    }
-    std::int64_t round = 0;
-    for (auto _ : state) {
+/// Seconds until all of `workers` threads have done `work(number of the thread)`.
+template <typename Work>
+double timed_threads(std::size_t workers, const Work& work) {
+    const auto begin = std::chrono::steady_clock::now();
+    {
         std::vector<std::jthread> threads;
-        for (std::int64_t w = 0; w < workers; ++w) {
-            threads.emplace_back(
-                [&chain = *chains[static_cast<std::size_t>(w)], w, workers, round] {
-                    const std::int64_t share = kStacks / workers;
-                    for (std::int64_t i = w * share; i < (w + 1) * share; ++i) {
-                        chain.generate(round * kStacks + i);
-                        chain.make_mesh();
-                        benchmark::DoNotOptimize(chain.encode());
-                    }
-                });
+        for (std::size_t worker = 0; worker < workers; ++worker) {
+            threads.emplace_back([&work, worker] { work(worker); });
         }
-        threads.clear();
+    }
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+constexpr std::int64_t kRoundStacks = 64;
+
+/// Each chain makes the cold meshes of its own stretch of a round's stacks, as the regions of
+/// `preseed` are shared out, so that no plot is made twice.
+double timed_round(std::span<const std::unique_ptr<Chain>> chains, std::int64_t round) {
+    return timed_threads(chains.size(), [chains, round](std::size_t worker) {
+        Chain& chain = *chains[worker];
+        const auto share = kRoundStacks / static_cast<std::int64_t>(chains.size());
+        const std::int64_t first = round * kRoundStacks + share * static_cast<std::int64_t>(worker);
+        for (std::int64_t i = first; i < first + share; ++i) {
+            chain.generate(i);
+            chain.make_mesh();
+            benchmark::DoNotOptimize(chain.encode());
+        }
+    });
+}
+
+/// Work that needs nothing but a core's registers and adders: what it gains by a second thread is
+/// all that the machine has to give.
+void add_in_registers(std::int64_t count) {
+    std::array<std::uint64_t, 8> sums{};
+    for (std::int64_t i = 0; i < count; ++i) {
+        for (std::uint64_t& sum : sums) {
+            benchmark::DoNotOptimize(sum += sum + 1);
+        }
+    }
+}
+
+double timed_additions(std::size_t workers) {
+    static constexpr std::int64_t kAdditions = 16'000'000;
+    return timed_threads(workers, [workers](std::size_t) {
+        add_in_registers(kAdditions / static_cast<std::int64_t>(workers));
+    });
+}
+
+/// One worker and two take turns at the same stacks, and one thread and two at additions, whichever
+/// of these is timed: a machine that others use as well is not the same from one second to the
+/// next.
+void workers(benchmark::State& state, bool is_additions) {
+    const auto chains_of = [](std::size_t count) {
+        std::vector<std::unique_ptr<Chain>> chains;
+        std::generate_n(std::back_inserter(chains), count,
+                        [] { return std::make_unique<Chain>("basin"); });
+        return chains;
+    };
+    const auto alone = chains_of(1);
+    const auto two = chains_of(2);
+    // Buffers grow to their size.
+    timed_round(alone, 0);
+    timed_round(two, 0);
+    std::int64_t round = 1;
+    for (auto _ : state) {
+        const std::array<double, 4> seconds = {timed_round(alone, round), timed_round(two, round),
+                                               timed_additions(1), timed_additions(2)};
+        const std::int64_t which = state.range(0) - 1 + (is_additions ? 2 : 0);
+        state.SetIterationTime(seconds[static_cast<std::size_t>(which)]);
         ++round;
     }
 }
@@ -159,7 +209,18 @@ void register_stages() {
 const bool kRegistered = (register_stages(), true);
 
 BENCHMARK(cold_level)->Arg(1)->Arg(3)->Arg(5)->Arg(9)->Arg(17)->Unit(benchmark::kMicrosecond);
-BENCHMARK(workers_whole)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(workers, whole, false)
+    ->Arg(1)
+    ->Arg(2)
+    ->Iterations(4)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(workers, additions, true)
+    ->Arg(1)
+    ->Arg(2)
+    ->Iterations(4)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
 
 const RatioEntry kWholePaper{
     {.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone, paper's B3",
@@ -183,9 +244,14 @@ const RatioEntry kLevelsOf[] = {RatioEntry{{.what = "whole cold mesh of level 1 
                                             .denominator = "cold_whole/basin",
                                             .bar = 1.3}}};
 const RatioEntry kWorkers{{.what = "two workers / one worker, time for 64 cold meshes",
-                           .numerators = {"workers_whole/2"},
-                           .denominator = "workers_whole/1",
+                           .numerators = {"workers/whole/2"},
+                           .denominator = "workers/whole/1",
                            .bar = 1 / 1.85}};
+const RatioEntry kMachine{
+    {.what = "the same of additions in registers: the machine's own two cores",
+     .numerators = {"workers/additions/2"},
+     .denominator = "workers/additions/1",
+     .bar = 1 / 1.85}};
 
 }  // namespace
 }  // namespace terrane::bench
