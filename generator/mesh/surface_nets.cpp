@@ -16,6 +16,7 @@
 #include "generator/mesh/lanes.h"
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
+#include "generator/mesh/steep_normals.h"
 #include "generator/mesh/surface_cells.h"
 #include "generator/mesh/water_surface.h"
 #include "protocol/base/check.h"
@@ -216,8 +217,13 @@ class VertexMaker {
         in_.kernels.cell_vertices(in_.results, queue.ends256.data(), queue.planes(),
                                   blocks * kCellBlock);
         const bool is_simple = &queue == &in_.simple;
+        const bool has_cliffs = !in_.covered256.empty();  // of a landscape
         for (std::size_t i = 0; i < queue.count; ++i) {
-            put(queue.cells[i], i, shade_of(queue.cells[i], i, is_simple));
+            const Cell& cell = queue.cells[i];
+            if (has_cliffs && is_steep(in_.results, i)) {
+                smooth_steep_normal(in_.results, i, columns_, cell.x, cell.z, cell.floor256);
+            }
+            put(cell, i, shade_of(cell, i, is_simple));
         }
         queue.count = 0;
     }
