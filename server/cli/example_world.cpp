@@ -12,7 +12,7 @@ std::string_view example_world() {
 # The same file gives the same terrain on every machine. Another seed gives another terrain of the
 # same character.
 
-format = 1              # of this file; 2 also knows rivers, folds and cave systems
+format = 1              # of this file; 2 also knows rivers, folds and cave systems: see canyon.toml
 name = "my world"
 seed = 42               # any whole number
 

@@ -3,6 +3,7 @@
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
+#include "server/cli/progress.h"
 #include "server/render/map_tile.h"
 
 #include <CLI/CLI.hpp>
@@ -70,7 +71,9 @@ int run_map(const MapOptions& options) {
         return kExitWrongUse;
     }
     const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
-    const auto image = draw_map(*world, *area, static_cast<std::int32_t>(cores));
+    ShownProgress progress("blocks");
+    const auto image = draw_map(*world, *area, static_cast<std::int32_t>(cores), progress.teller());
+    progress.finish();
     if (!image) {
         return wrong_use(image.error());
     }

@@ -3,6 +3,7 @@
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
+#include "server/cli/progress.h"
 #include "server/render/png.h"
 #include "server/render/render_picture.h"
 
@@ -54,7 +55,9 @@ int run_picture(const PictureOptions& options) {
     }
     const auto threads =
         static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
-    const auto image = render_picture(*world, view, threads);
+    ShownProgress progress("rows");
+    const auto image = render_picture(*world, view, threads, progress.teller());
+    progress.finish();
     if (!image) {
         return wrong_use(image.error());
     }

@@ -105,7 +105,7 @@ int run_preseed(const PreseedOptions& options) {
         return kExitFailed;
     }
     const auto begin = std::chrono::steady_clock::now();
-    Progress progress(batches->stacks(), stderr, isatty(STDERR_FILENO) == 1);
+    Progress progress(batches->stacks(), "stacks", stderr, isatty(STDERR_FILENO) == 1);
     const auto outcome =
         preseed_area(*world, **store, *batches, workers_of(options.area), [&](std::uint64_t done) {
             progress.show(done);

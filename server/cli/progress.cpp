@@ -1,5 +1,7 @@
 #include "server/cli/progress.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <string_view>
 
@@ -60,18 +62,19 @@ std::string progress_bar(const ProgressState& state) {
     std::string percent = std::to_string(share_of(state, 100));
     percent.insert(0, 3 - std::min<std::size_t>(percent.size(), 3), ' ');
     return "[" + std::string(cells, '#') + std::string(kBarCells - cells, '-') + "] " + percent +
-           " %  " + std::to_string(state.done) + "/" + std::to_string(state.total) + " stacks  " +
-           rate_of(state) + "  ETA " + eta_of(state);
+           " %  " + std::to_string(state.done) + "/" + std::to_string(state.total) + " " +
+           std::string(state.unit) + "  " + rate_of(state) + "  ETA " + eta_of(state);
 }
 
 std::string progress_line(const ProgressState& state) {
-    return std::to_string(state.done) + " of " + std::to_string(state.total) + " stacks (" +
-           std::to_string(share_of(state, 100)) + " %), " + rate_of(state) + ", ETA " +
-           eta_of(state);
+    return std::to_string(state.done) + " of " + std::to_string(state.total) + " " +
+           std::string(state.unit) + " (" + std::to_string(share_of(state, 100)) + " %), " +
+           rate_of(state) + ", ETA " + eta_of(state);
 }
 
-Progress::Progress(std::uint64_t total, std::FILE* out, bool is_terminal)
+Progress::Progress(std::uint64_t total, std::string_view unit, std::FILE* out, bool is_terminal)
     : total_(total),
+      unit_(unit),
       out_(out),
       is_terminal_(is_terminal),
       next_(Clock::now() + (is_terminal ? Clock::duration(kBarInterval) : kLineInterval)) {}
@@ -88,7 +91,7 @@ void Progress::show(std::uint64_t done, Clock::time_point now) {
     }
     const std::chrono::duration<double> window = now - samples_.front().time;
     const std::uint64_t made = done - samples_.front().done;
-    ProgressState state{.done = done, .total = total_, .per_second = std::nullopt};
+    ProgressState state{.done = done, .total = total_, .unit = unit_, .per_second = std::nullopt};
     if (window.count() > 0 && made > 0) {
         state.per_second = static_cast<double>(made) / window.count();
     }
@@ -108,6 +111,21 @@ void Progress::finish() {
         std::fputs(kClearLine.data(), out_);
         std::fflush(out_);
         drawn_ = false;
+    }
+}
+
+std::function<void(std::uint64_t, std::uint64_t)> ShownProgress::teller() {
+    return [this](std::uint64_t done, std::uint64_t total) {
+        if (!progress_) {
+            progress_.emplace(total, unit_, stderr, isatty(STDERR_FILENO) == 1);
+        }
+        progress_->show(done);
+    };
+}
+
+void ShownProgress::finish() {
+    if (progress_) {
+        progress_->finish();
     }
 }
 

@@ -5,14 +5,17 @@
 #include <cstdint>
 #include <cstdio>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace terrane {
 
 struct ProgressState {
     std::uint64_t done = 0;
     std::uint64_t total = 0;
+    std::string_view unit;             ///< "stacks"
     std::optional<double> per_second;  ///< nothing yet, or standing still: nothing
 };
 
@@ -30,7 +33,8 @@ class Progress {
   public:
     using Clock = std::chrono::steady_clock;
 
-    Progress(std::uint64_t total, std::FILE* out, bool is_terminal);
+    /// Of `total` things called `unit`, which must outlive it.
+    Progress(std::uint64_t total, std::string_view unit, std::FILE* out, bool is_terminal);
 
     /// Draws if it is time to: often on a terminal, every 10 s elsewhere.
     void show(std::uint64_t done, Clock::time_point now = Clock::now());
@@ -44,11 +48,26 @@ class Progress {
     };
 
     const std::uint64_t total_;
+    const std::string_view unit_;
     std::FILE* const out_;
     const bool is_terminal_;
     bool drawn_ = false;
     Clock::time_point next_;
     std::deque<Sample> samples_;  ///< of the last 20 s, at most two a second
+};
+
+/// Progress on the standard error stream, of work that tells its total as it goes.
+class ShownProgress {
+  public:
+    explicit ShownProgress(std::string_view unit) : unit_(unit) {}
+
+    /// To be called by one thread at a time, and not after `finish`.
+    std::function<void(std::uint64_t done, std::uint64_t total)> teller();
+    void finish();
+
+  private:
+    const std::string_view unit_;
+    std::optional<Progress> progress_;
 };
 
 }  // namespace terrane

@@ -81,7 +81,7 @@ int run_verify(const VerifyOptions& options) {
         return kExitWrongUse;
     }
     InterruptWatch interrupt;
-    Progress progress(batches->stacks(), stderr, isatty(STDERR_FILENO) == 1);
+    Progress progress(batches->stacks(), "stacks", stderr, isatty(STDERR_FILENO) == 1);
     const auto area =
         hash_area(*world, *batches, workers_of(options.area), [&](std::uint64_t done) {
             progress.show(done);

@@ -168,7 +168,8 @@ struct BlockQueue {
     }
 };
 
-void draw_blocks(Image& image, BlockQueue& queue, const World& world, const MapArea& area) {
+void draw_blocks(Image& image, BlockQueue& queue, const World& world, const MapArea& area,
+                 DrawProgress& progress) {
     try {
         StackGenerator generator(world);
         const Drawing drawing{.world = &world, .generator = &generator};
@@ -177,6 +178,7 @@ void draw_blocks(Image& image, BlockQueue& queue, const World& world, const MapA
                 queue.fail_with(drawn.error());
                 return;
             }
+            progress.add_one();
         }
     } catch (const std::exception& error) {
         queue.fail_with({.code = ErrorCode::internal, .message = error.what()});
@@ -219,17 +221,19 @@ Result<Image> draw_map(const Drawing& drawing, const MapArea& area) {
     return image;
 }
 
-Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads) {
+Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads,
+                       const TellDrawn& tell) {
     auto image = make_image(area.width, area.height);
     if (!image) {
         return image;
     }
     BlockQueue queue;
+    DrawProgress progress(static_cast<std::uint64_t>(blocks_of(area)), tell);
     {
         std::vector<std::jthread> workers;
         try {
             for (std::int32_t i = 0; i < std::min(threads, blocks_of(area)); ++i) {
-                workers.emplace_back([&] { draw_blocks(*image, queue, world, area); });
+                workers.emplace_back([&] { draw_blocks(*image, queue, world, area, progress); });
             }
         } catch (const std::exception& error) {
             queue.fail_with({.code = ErrorCode::internal, .message = error.what()});

@@ -8,6 +8,7 @@
 
 #include "protocol/base/coords.h"
 #include "protocol/base/result.h"
+#include "server/render/draw_progress.h"
 #include "server/render/drawing.h"
 #include "server/render/picture_keys.h"
 #include "server/render/png.h"
@@ -38,8 +39,9 @@ struct MapArea {
 Result<Image> draw_map(const Drawing& drawing, const MapArea& area);
 
 /// The same with `threads` >= 1 threads that share the blocks of the picture; the pixels do not
-/// depend on how many. `internal`: there is no memory or no such thread.
-Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads);
+/// depend on how many. `internal`: there is no memory or no such thread. Tells of blocks.
+Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t threads,
+                       const TellDrawn& tell = {});
 
 Result<Image> draw_map_tile(const Drawing& drawing, const MapTile& tile);
 

@@ -107,7 +107,8 @@ Result<void> check(const PictureView& view) {
 
 }  // namespace
 
-Result<Image> render_picture(const World& world, const PictureView& view, std::int32_t threads) {
+Result<Image> render_picture(const World& world, const PictureView& view, std::int32_t threads,
+                             const TellDrawn& tell) {
     if (auto checked = check(view); !checked) {
         return tl::unexpected(checked.error());
     }
@@ -129,12 +130,14 @@ Result<Image> render_picture(const World& world, const PictureView& view, std::i
     const Camera camera = camera_of(view, eye);
     const Light light = light_of(view, camera);
     std::atomic<std::int32_t> next_row = 0;
+    DrawProgress progress(static_cast<std::uint64_t>(view.height), tell);
     std::vector<std::jthread> workers;
     for (std::int32_t i = 0; i < threads; ++i) {
         workers.emplace_back([&] {
             SceneReader reader(scene);
             for (std::int32_t row = next_row++; row < view.height; row = next_row++) {
                 draw_row(*image, row, reader, camera, light);
+                progress.add_one();
             }
         });
     }

@@ -3,6 +3,7 @@
 
 #include "generator/terrain/world.h"
 #include "protocol/base/result.h"
+#include "server/render/draw_progress.h"
 #include "server/render/png.h"
 #include "server/render/scene.h"
 
@@ -26,7 +27,8 @@ struct PictureView {
 /// Draws with `threads` >= 1 threads; the pixels do not depend on how many. Fails with
 /// `invalid_argument` when eye and look are one place, the eye is inside the ground or the block
 /// has no or too large an area, `out_of_range` for an eye at or beyond the world's edge,
-/// `too_large` for a picture above make_image's limits.
-Result<Image> render_picture(const World& world, const PictureView& view, std::int32_t threads);
+/// `too_large` for a picture above make_image's limits. Tells of rows.
+Result<Image> render_picture(const World& world, const PictureView& view, std::int32_t threads,
+                             const TellDrawn& tell = {});
 
 }  // namespace terrane

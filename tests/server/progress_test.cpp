@@ -22,16 +22,16 @@ TEST(Progress, WritesDurationsAsPeopleDo) {
 }
 
 TEST(Progress, DrawsABarWithRateAndEta) {
-    EXPECT_EQ(progress_bar({.done = 1234, .total = 4096, .per_second = 56.7}),
+    EXPECT_EQ(progress_bar({.done = 1234, .total = 4096, .unit = "stacks", .per_second = 56.7}),
               "[######--------------]  30 %  1234/4096 stacks  56.7/s  ETA 0:50");
-    EXPECT_EQ(progress_bar({.done = 0, .total = 64, .per_second = std::nullopt}),
+    EXPECT_EQ(progress_bar({.done = 0, .total = 64, .unit = "stacks", .per_second = std::nullopt}),
               "[--------------------]   0 %  0/64 stacks  -/s  ETA -");
-    EXPECT_EQ(progress_bar({.done = 64, .total = 64, .per_second = 10.0}),
+    EXPECT_EQ(progress_bar({.done = 64, .total = 64, .unit = "stacks", .per_second = 10.0}),
               "[####################] 100 %  64/64 stacks  10.0/s  ETA 0:00");
 }
 
 TEST(Progress, WritesALineWithRateAndEta) {
-    EXPECT_EQ(progress_line({.done = 1234, .total = 4096, .per_second = 56.7}),
+    EXPECT_EQ(progress_line({.done = 1234, .total = 4096, .unit = "stacks", .per_second = 56.7}),
               "1234 of 4096 stacks (30 %), 56.7/s, ETA 0:50");
 }
 
@@ -40,7 +40,7 @@ std::string shown(bool is_terminal) {
     std::size_t size = 0;
     std::FILE* out = open_memstream(&text, &size);
     const auto begin = Progress::Clock::now();
-    Progress progress(1000, out, is_terminal);
+    Progress progress(1000, "stacks", out, is_terminal);
     for (int second = 0; second <= 25; ++second) {
         progress.show(static_cast<std::uint64_t>(second) * 10, begin + second * 1s);
     }
