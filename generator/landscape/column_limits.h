@@ -96,6 +96,9 @@ class LimitWriter {
     /// Up to here no overlay comes.
     std::int32_t clear_to() const { return overlays_.empty() ? INT32_MAX : overlays_.front().low; }
 
+    /// Whether a run that does not blend goes on with what is there.
+    bool goes_on_with(LimitTail tail) const { return out_ != first_ && tail == shown_; }
+
     /// For those who write limits themselves as far as it is clear: where they go, and where they
     /// went.
     Limit* position() const { return out_; }
@@ -142,8 +145,8 @@ class LimitWriter {
     void put(const Run& run) {
         const bool blends = run.middle > run.bottom;
         const LimitTail start = blends ? run.from : run.tail;
-        if (out_ != first_ && start == shown_) {
-            out_ -= blends ? 0 : 1;  // goes on with what is there
+        if (goes_on_with(start)) {
+            out_ -= blends ? 0 : 1;
         } else {
             put_limit(out_++, run.bottom, start);
         }

@@ -17,6 +17,132 @@ constexpr float kLeastCover = 0.25F;  ///< voxels
 constexpr float kLeastSand = 1.2F;    ///< voxels
 constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
 
+/// Up the layers of a block. Its functions are inlined where it is a local: what moves stays in
+/// registers.
+struct LayerWalk {
+    const std::int32_t* y256 = nullptr;
+    const std::int32_t* flow = nullptr;
+    std::ptrdiff_t plane = 0;
+    std::ptrdiff_t flow_plane = 0;
+    std::ptrdiff_t to_middle = 0;  ///< from a layer's top to where it has blended
+    std::int32_t k = 0;
+    std::int32_t layers = 0;
+    std::int32_t moved = 0;
+    std::int32_t bottom = 0;  ///< of what is to come
+    bool is_regular = false;  ///< all layers stand and blend as they were laid down
+
+    void go_on() {
+        ++k;
+        y256 += plane;
+        flow += flow_plane;
+    }
+
+    std::int32_t top() const { return *y256 + moved; }
+
+    LimitTail tail() const { return tail_of(static_cast<std::uint16_t>(k), *flow); }
+};
+
+/// Whole regular layers that follow the walk's, up to `end`.
+[[gnu::always_inline]] inline Limit* put_whole(Limit* to, LayerWalk& walk, std::int32_t end) {
+    const std::int32_t most = end - walk.moved;
+    const std::int32_t begun = walk.k;
+    for (; walk.k + 1 < walk.layers && walk.y256[walk.plane] <= most; to += 2) {
+        walk.go_on();
+        const LimitTail tail = walk.tail();
+        put_limit(to, walk.y256[walk.to_middle] + walk.moved, tail);
+        put_limit(to + 1, walk.top(), tail);
+    }
+    if (walk.k > begun) {
+        walk.bottom = walk.top();
+    }
+    return to;
+}
+
+/// How high a layer blends out of the one below; `thickness` is the part of it that stands.
+std::int32_t blend_of(const LayerRules& below, const LayerRules& rule, std::int32_t thickness) {
+    return below.alone || rule.alone || rule.blend <= 0
+               ? 0
+               : std::max(1, (thickness * rule.blend + 128) >> 8);
+}
+
+/// The walk's layer and those above, to `end`, before which no overlay comes.
+[[gnu::always_inline]] inline void write_clear(LimitWriter& out, LayerWalk& walk,
+                                               const LayerRules* rules, std::int32_t end) {
+    Limit* to = out.position();
+    LimitTail tail = walk.tail();
+    if (out.goes_on_with(tail)) {
+        --to;
+    } else {
+        put_limit(to++, walk.bottom, tail);
+    }
+    walk.bottom = std::min(walk.top(), end);
+    put_limit(to++, walk.bottom, tail);
+    std::int32_t below = walk.k;
+    while (walk.bottom < end) {
+        if (walk.is_regular) {
+            to = put_whole(to, walk, end);
+            below = walk.k;
+            tail = walk.tail();
+            if (walk.bottom == end) {
+                break;
+            }
+        }
+        walk.go_on();
+        if (walk.k == walk.layers) {
+            break;
+        }
+        const std::int32_t top = walk.top();
+        if (top <= walk.bottom) {
+            continue;
+        }
+        tail = walk.tail();
+        const std::int32_t blend = blend_of(rules[below], rules[walk.k], top - walk.bottom);
+        const std::int32_t middle = walk.bottom + blend;
+        walk.bottom = std::min(top, end);
+        put_limit(to, middle, tail);
+        to += blend == 0 || middle < walk.bottom ? 1 : 0;
+        put_limit(to++, walk.bottom, tail);
+        below = walk.k;
+    }
+    out.set_position(to, walk.bottom, tail);
+}
+
+/// Likewise where overlays come.
+[[gnu::always_inline]] inline void write_overlaid(LimitWriter& out, LayerWalk& walk,
+                                                  const LayerRules* rules, std::int32_t end) {
+    static constexpr LayerRules kNothingBelow{.alone = true};
+    const LayerRules* below_rules = &kNothingBelow;
+    LimitTail below = 0;
+    for (; walk.k < walk.layers; walk.go_on()) {
+        const std::int32_t top = walk.top();
+        if (top <= walk.bottom) {
+            continue;
+        }
+        const LayerRules& rule = rules[walk.k];
+        const LimitTail tail = walk.tail();
+        const std::int32_t own_end = std::min(top, end);
+        const std::int32_t blend = blend_of(*below_rules, rule, top - walk.bottom);
+        out.write({.bottom = walk.bottom,
+                   .top = own_end,
+                   .middle = std::min(walk.bottom + blend, own_end),
+                   .tail = tail,
+                   .from = below});
+        walk.bottom = own_end;
+        below = tail;
+        below_rules = &rule;
+        const std::int32_t clear_to = std::min(end, out.clear_to());
+        if (walk.is_regular && own_end < clear_to && out.top() == own_end && out.shown() == tail) {
+            Limit* const to = put_whole(out.position(), walk, clear_to);
+            below = walk.tail();
+            below_rules = rules + walk.k;
+            out.set_position(to, walk.bottom, below);
+        }
+        if (walk.bottom >= end) {
+            return;
+        }
+    }
+}
+
 }  // namespace
 
 /// The planes that pass under the ground part the column.
@@ -160,97 +286,40 @@ std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const 
 
 std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
                                      std::int32_t end) const {
-    const Region& region = sources_.region;
-    const auto plane = static_cast<std::ptrdiff_t>(region.plane_size());
-    const std::int32_t* y256 = region.y256.data() + place.at;
-    const auto layers = static_cast<std::int32_t>(region.layers_built);
-    const LayerRules* const rules = sources_.rules.data();
     static constexpr std::int32_t kNoFlow = 0;
-    const std::int32_t* flow = place.flow == nullptr ? &kNoFlow : place.flow;
-    const std::ptrdiff_t flow_plane = place.flow == nullptr ? 0 : place.flow_plane;
-    const std::int32_t moved = block.moved;
-    std::int32_t k = 0;
-    for (const std::int32_t low = block.bottom - moved; k < layers && *y256 <= low; ++k) {
-        y256 += plane;
-        flow += flow_plane;
+    const Region& region = sources_.region;
+    const std::int32_t* const y256 = region.y256.data() + place.at;
+    LayerWalk walk{.y256 = y256,
+                   .flow = place.flow == nullptr ? &kNoFlow : place.flow,
+                   .plane = static_cast<std::ptrdiff_t>(region.plane_size()),
+                   .flow_plane = place.flow == nullptr ? 0 : place.flow_plane,
+                   .to_middle = region.middle.data() + place.at - y256,
+                   .layers = static_cast<std::int32_t>(region.layers_built),
+                   .moved = block.moved,
+                   .bottom = block.bottom,
+                   .is_regular = region.irregular[place.at] == 0};
+    while (walk.k < walk.layers && walk.top() <= block.bottom) {
+        walk.go_on();
     }
-    const std::int32_t* middle256 = region.middle.data() + place.at + k * plane;
-    const bool is_regular = region.irregular[place.at] == 0;
-    std::int32_t bottom = block.bottom;
-    LimitTail below = 0;
-    bool below_alone = true;
-    // Not null: what is right below was written as it is.
-    Limit* to = bottom == 0 ? out.position() : nullptr;
-    std::int32_t clear_to = out.clear_to();
-    const auto go_on = [&] {
-        ++k;
-        y256 += plane;
-        middle256 += plane;
-        flow += flow_plane;
-    };
-    for (; k < layers && bottom < end; go_on()) {
-        const std::int32_t top = *y256 + moved;
-        if (top <= bottom) {
-            continue;
-        }
-        const LayerRules& rule = rules[k];
-        const LimitTail tail = tail_of(static_cast<std::uint16_t>(k), *flow);
-        const std::int32_t blend = below_alone || rule.alone || rule.blend <= 0
-                                       ? 0
-                                       : std::max(1, ((top - bottom) * rule.blend + 128) >> 8);
-        const std::int32_t own_end = std::min(top, end);
-        const std::int32_t middle = bottom + blend;
-        if (to != nullptr && own_end <= clear_to) {
-            put_limit(to, middle, tail);
-            to += blend == 0 || middle < own_end ? 1 : 0;
-            put_limit(to++, own_end, tail);
+    if (walk.k < walk.layers) {
+        // An overlay of the block below may reach into this one.
+        if (end <= out.clear_to() && out.top() <= block.bottom) {
+            write_clear(out, walk, sources_.rules.data(), end);
         } else {
-            if (to != nullptr) {
-                out.set_position(to, bottom, below);
-            }
-            out.write({.bottom = bottom,
-                       .top = own_end,
-                       .middle = std::min(middle, own_end),
-                       .tail = tail,
-                       .from = below});
-            clear_to = out.clear_to();
-            to = out.top() == own_end && out.shown() == tail ? out.position() : nullptr;
-        }
-        bottom = own_end;
-        below = tail;
-        below_alone = rule.alone;
-        if (!is_regular || to == nullptr) {
-            continue;
-        }
-        // Whole layers that all stand and blend as they were laid down.
-        const std::int32_t most = std::min(end, clear_to) - moved;
-        const std::int32_t begun = k;
-        while (k + 1 < layers && y256[plane] <= most) {
-            go_on();
-            below = tail_of(static_cast<std::uint16_t>(k), *flow);
-            put_limit(to, *middle256 + moved, below);
-            put_limit(to + 1, *y256 + moved, below);
-            to += 2;
-        }
-        if (k > begun) {
-            bottom = *y256 + moved;
-            below_alone = rules[k].alone;
+            write_overlaid(out, walk, sources_.rules.data(), end);
         }
     }
-    if (to != nullptr) {
-        out.set_position(to, bottom, below);
-    }
-    if (bottom < end) {  // the stack ends below the ground
+    if (walk.bottom < end) {  // the stack ends below the ground
         const std::uint16_t soil = sources_.constants.palette.soil;
-        const auto last = static_cast<std::uint16_t>(layers - 1);
+        const auto last = static_cast<std::uint16_t>(walk.layers - 1);
         out.write(
-            {.bottom = bottom,
+            {.bottom = walk.bottom,
              .top = end,
-             .middle = bottom,
+             .middle = walk.bottom,
              .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last)),
              .from = 0});
     }
-    return static_cast<std::size_t>(std::max(k, 1) - 1);
+    return static_cast<std::size_t>(std::min(walk.k, walk.layers - 1));
 }
 
 void ColumnMaker::write_overhang(LimitWriter& out, const Place& place) const {
