@@ -24,17 +24,14 @@ RectangleShape field_of(const RectangleShape& shape, std::int32_t apron, std::in
             .length = shape.length + 2 * margin};
 }
 
-/// Keeps the inner part of a raster.
-void crop(std::vector<float>& raster, const RectangleShape& from, const RectangleShape& to) {
-    const std::int64_t column = to.x0 - from.x0;
-    const std::int64_t row = to.z0 - from.z0;
-    if (from.stride() == to.stride() && column == 0 && row == 0) {
-        return;
-    }
+/// The inner part of a raster.
+void crop(std::vector<float>& out, const std::vector<float>& raster, const RectangleShape& from,
+          const RectangleShape& to) {
+    out.resize(to.padded_size());
+    const float* const first = raster.data() + (to.z0 - from.z0) * from.stride() + to.x0 - from.x0;
     for (std::int32_t z = 0; z < to.length; ++z) {
-        const float* const first = raster.data() + (z + row) * from.stride() + column;
-        std::copy(first, first + to.width,
-                  raster.data() + static_cast<std::ptrdiff_t>(z) * to.stride());
+        const float* const row = first + static_cast<std::ptrdiff_t>(z) * from.stride();
+        std::copy(row, row + to.width, out.data() + static_cast<std::ptrdiff_t>(z) * to.stride());
     }
 }
 
@@ -75,29 +72,23 @@ std::size_t Landscape::field_index(const RectangleShape& shape, std::int32_t x,
 
 void Landscape::build_fields(const Region& region, const RowKernels& kernels) {
     field_ = field_of(region.shape, region.apron, constants_.overhangs.reach);
-    const std::size_t size = field_.padded_size();
-    for (std::vector<float>* raster : {&folds_, &raw_, &fine_, &moved_}) {
-        raster->resize(size);
-    }
-    fold_rectangle(folds_.data(), constants_.folds, field_, kernels, noise_);
+    fields_ = &field_builder_.build({.folds = constants_.folds,
+                                     .relief = constants_.relief,
+                                     .erosion = constants_.erosion,
+                                     .has_relief = constants_.has_relief},
+                                    field_, kernels, noise_);
     fractures_.build(constants_.fractures, field_, kernels, noise_);
     if (!constants_.has_relief) {
         return;
     }
-    relief_builder_.build(relief_, constants_.relief, field_, kernels, noise_);
-    erode(raw_.data(), fine_.data(), relief_, constants_.erosion, field_, kernels, erosion_);
-    for (std::size_t i = 0; i < size; ++i) {
-        raw_[i] = relief_.ground[i] + relief_.mountain[i] * raw_[i];
-        fine_[i] = relief_.mountain[i] * fine_[i];
-        moved_[i] = folds_[i];
-    }
+    moved_ = fields_->folds;
     if (!fractures_.is_empty()) {
         for (std::int32_t z = 0; z < field_.length; ++z) {
             for (std::int32_t x = 0; x < field_.width; ++x) {
                 const auto i = static_cast<std::size_t>(z * field_.stride() + x);
                 const auto planes = fractures_.planes(i);
                 if (!planes.empty()) {
-                    moved_[i] += displacement_at(planes, raw_[i]);
+                    moved_[i] += displacement_at(planes, fields_->raw[i]);
                 }
             }
         }
@@ -123,7 +114,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
             for (std::int32_t x = 0; x < shape.width; ++x) {
                 const auto i = static_cast<std::size_t>(z * shape.stride() + x);
                 const std::size_t at = field_index(shape, x, z);
-                const float folded = top[i] + folds_[at];
+                const float folded = top[i] + fields_->folds[at];
                 ground_[i] =
                     std::max(2.0F, folded + displacement_at(fractures_.planes(at), folded));
             }
@@ -139,7 +130,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
         const std::size_t from = field_index(shape, 0, z);
         float* const over = over_.data() + static_cast<std::ptrdiff_t>(z) * shape.stride();
         for (std::size_t x = 0; x < static_cast<std::size_t>(shape.width); ++x) {
-            over[x] = raw_[from + x] - moved_[from + x];
+            over[x] = fields_->raw[from + x] - moved_[from + x];
         }
     }
     ResistanceWalk walk(ground_.data(), rest_.data(), over_.data(), size);
@@ -156,10 +147,10 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
         float* const ground = ground_.data() + static_cast<std::ptrdiff_t>(z) * shape.stride();
         for (std::size_t x = 0; x < static_cast<std::size_t>(shape.width); ++x) {
             const std::size_t at = from + x;
-            const float raw = raw_[at];
-            const float share = smooth_step(0.04F, 0.3F, relief_.crest[at]);
-            ground[x] =
-                std::max(2.0F, raw + (ground[x] + moved_[at] - raw) * share + fine_[at] * share);
+            const float raw = fields_->raw[at];
+            const float share = smooth_step(0.04F, 0.3F, fields_->crest[at]);
+            ground[x] = std::max(
+                2.0F, raw + (ground[x] + moved_[at] - raw) * share + fields_->fine[at] * share);
         }
     }
 }
@@ -221,8 +212,8 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
         std::array<float, kRectangleSideMax> lowered;
         std::array<float, kRectangleSideMax> lifted;
         const auto width = static_cast<std::size_t>(shape.width);
-        std::copy_n(folds_.data() + at, width, lowered.data());
-        std::copy_n(folds_.data() + at, width, lifted.data());
+        std::copy_n(fields_->folds.data() + at, width, lowered.data());
+        std::copy_n(fields_->folds.data() + at, width, lifted.data());
         for (std::size_t x = 1; has_planes && x + 1 < width; ++x) {
             for (const PlaneInColumn& one : fractures_.planes(at + x)) {
                 lowered[x] -= one.half_throw;
@@ -285,19 +276,20 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
     if (shape.step == 1 && constants_.has_relief) {
         overhangs_.build(constants_.overhangs, constants_.resistance,
                          {.field = field_,
-                          .raw = raw_.data(),
+                          .raw = fields_->raw.data(),
                           .moved = moved_.data(),
-                          .crest = relief_.crest.data(),
-                          .fine = fine_.data()},
+                          .crest = fields_->crest.data(),
+                          .fine = fields_->fine.data()},
                          region, constants, ground_.data(), kernels, noise_);
     } else {
         overhangs_.clear();
     }
     if (constants_.has_relief) {
-        for (std::vector<float>* raster :
-             {&relief_.crest, &relief_.river, &relief_.wander_x, &relief_.wander_z}) {
-            crop(*raster, field_, shape);
-        }
+        crop(relief_.crest, fields_->crest, field_, shape);
+        crop(relief_.river, fields_->river, field_, shape);
+        crop(relief_.wander_x, fields_->wander_x, field_, shape);
+        crop(relief_.wander_z, fields_->wander_z, field_, shape);
+        relief_.is_smooth = fields_->is_smooth;
     }
     if (shape.step == 1 && constants_.caves.cell > 0) {
         cave_graph_.build(constants_.caves, constants_.folds, shape);
@@ -309,7 +301,7 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
             ground = std::max(2.0F, ground);
         }
     }
-    cut_channels(ground_.data(), channels_, constants_.channels, relief_, relief_builder_.rivers(),
+    cut_channels(ground_.data(), channels_, constants_.channels, relief_, field_builder_.rivers(),
                  shape, kernels);
     raise_banks(region);
     if (shape.step == 1 && constants_.caves.cell > 0) {
@@ -351,7 +343,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
                        .caves = caves_,
                        .overhangs = overhangs_,
                        .fractures = fractures_,
-                       .folds = folds_,
+                       .folds = fields_->folds,
                        .field = field_,
                        .field_first = field_index(region.shape, 0, 0)},
                       out.element_ids, out.element_limits);

@@ -9,12 +9,10 @@
 
 #include "generator/landscape/caves.h"
 #include "generator/landscape/channels.h"
-#include "generator/landscape/erosion.h"
-#include "generator/landscape/fold.h"
 #include "generator/landscape/fractures.h"
+#include "generator/landscape/land_fields.h"
 #include "generator/landscape/landscape_palette.h"
 #include "generator/landscape/overhangs.h"
-#include "generator/landscape/relief.h"
 #include "generator/landscape/resistance.h"
 #include "generator/terrain/column_writer.h"
 #include "generator/terrain/region.h"
@@ -79,17 +77,14 @@ class Landscape {
 
     RectangleShape field_;  ///< the region's shape, grown by what overhangs look at
     NoiseBuffers noise_;
-    ErosionBuffers erosion_;
-    ReliefBuilder relief_builder_;
-    ReliefRasters relief_;  ///< of field_, then of the region's shape
+    LandFieldBuilder field_builder_;
+    const LandFields* fields_ = nullptr;  ///< of field_
+    ReliefRasters relief_;                ///< of the region's shape: its rivers and crests
     FractureField fractures_;
     CaveGraph cave_graph_;
     CaveField caves_;
     ChannelRasters channels_;
     OverhangField overhangs_;
-    std::vector<float> folds_;  ///< of field_
-    std::vector<float> raw_;    ///< of field_: height before the rock is asked
-    std::vector<float> fine_;   ///< of field_: the finer gullies
     std::vector<float> moved_;  ///< of field_: Us, what structure did to the rock at raw height
     std::vector<float> over_;   ///< of the region's shape from here on
     std::vector<float> rest_;

@@ -163,7 +163,11 @@ ReliefConstants::ReliefConstants(const WorldDefinition& definition)
       mountains(Noise::make(key(definition.seed, LandscapeTag::mountains),
                             definition.relief.province, 2)) {}
 
-void ReliefBuilder::find_rivers(const RiverConstants& constants, const RectangleShape& shape) {
+void ReliefBuilder::find_rivers(const ReliefConstants& relief, const RectangleShape& shape) {
+    const RiverConstants& constants = relief.rivers;
+    if (shape.step > constants.cell_x) {
+        return;  // nobody asks for them
+    }
     const auto wander = static_cast<std::int64_t>(constants.wander) + 1;
     const std::int64_t margin = wander + 2 * kLatticeStep;
     const std::int64_t x1 = shape.x0 + (shape.width - 1) * shape.step;
@@ -324,7 +328,6 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
         std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
         return;
     }
-    find_rivers(constants.rivers, shape);
     out.is_smooth = shape.step <= constants.rivers.cell_x / kSmoothSteps;
     const Axis x(shape.x0, shape.width, shape.step, out.is_smooth);
     const Axis z(shape.z0, shape.length, shape.step, out.is_smooth);

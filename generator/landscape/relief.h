@@ -56,6 +56,9 @@ struct ReliefRasters {
 /// Builds relief for one worker; keeps its rivers and buffers.
 class ReliefBuilder {
   public:
+    /// Makes the rivers around a shape known; before what is inside of it is built.
+    void find_rivers(const ReliefConstants& constants, const RectangleShape& shape);
+
     void build(ReliefRasters& out, const ReliefConstants& constants, const RectangleShape& shape,
                const RowKernels& kernels, NoiseBuffers& buffers);
 
@@ -72,7 +75,6 @@ class ReliefBuilder {
         std::size_t length = 0;
     };
 
-    void find_rivers(const RiverConstants& constants, const RectangleShape& shape);
     void fill_lattice(const ReliefConstants& constants, const Axis& x, const Axis& z,
                       const RowKernels& kernels, NoiseBuffers& buffers);
     void fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
