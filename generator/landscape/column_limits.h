@@ -68,6 +68,9 @@ struct Run {
     LimitTail from = 0;
 };
 
+/// Shown where nothing is yet: no tail is this one.
+inline constexpr LimitTail kNothingShown = ~LimitTail{0};
+
 /// Writes one limit.
 inline void put_limit(Limit* to, std::int32_t y256, LimitTail tail) {
     static_assert(sizeof(Limit) == sizeof y256 + sizeof tail && offsetof(Limit, palette_id) == 4 &&
@@ -85,8 +88,7 @@ class LimitWriter {
         return 3 * (runs + 2 * overlays) + 1;
     }
 
-    LimitWriter(Limit* out, std::span<const Overlay> overlays)
-        : first_(out), out_(out), overlays_(overlays) {}
+    LimitWriter(Limit* out, std::span<const Overlay> overlays) : out_(out), overlays_(overlays) {}
 
     std::int32_t top() const { return top_; }
 
@@ -95,9 +97,6 @@ class LimitWriter {
 
     /// Up to here no overlay comes.
     std::int32_t clear_to() const { return overlays_.empty() ? INT32_MAX : overlays_.front().low; }
-
-    /// Whether a run that does not blend goes on with what is there.
-    bool goes_on_with(LimitTail tail) const { return out_ != first_ && tail == shown_; }
 
     /// For those who write limits themselves as far as it is clear: where they go, and where they
     /// went.
@@ -145,8 +144,8 @@ class LimitWriter {
     void put(const Run& run) {
         const bool blends = run.middle > run.bottom;
         const LimitTail start = blends ? run.from : run.tail;
-        if (goes_on_with(start)) {
-            out_ -= blends ? 0 : 1;
+        if (start == shown_) {
+            out_ -= blends ? 0 : 1;  // goes on with what is there
         } else {
             put_limit(out_++, run.bottom, start);
         }
@@ -158,11 +157,10 @@ class LimitWriter {
         top_ = run.top;
     }
 
-    const Limit* first_;
     Limit* out_;
     std::span<const Overlay> overlays_;  ///< those to come
     std::int32_t top_ = 0;
-    LimitTail shown_ = 0;
+    LimitTail shown_ = kNothingShown;
 };
 
 }  // namespace terrane

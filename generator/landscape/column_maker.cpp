@@ -20,6 +20,7 @@ constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
 /// Up the layers of a block. Its functions are inlined where it is a local: what moves stays in
 /// registers.
 struct LayerWalk {
+    static constexpr std::int32_t kNoFlow = 0;
     const std::int32_t* y256 = nullptr;
     const std::int32_t* flow = nullptr;
     std::ptrdiff_t plane = 0;
@@ -35,6 +36,23 @@ struct LayerWalk {
         ++k;
         y256 += plane;
         flow += flow_plane;
+    }
+
+    LayerWalk(const Region& region, std::size_t at, const std::int32_t* flow_of,
+              std::int32_t bottom_of, std::int32_t moved_by)
+        : y256(region.y256.data() + at),
+          flow(flow_of == nullptr ? &kNoFlow : flow_of),
+          plane(static_cast<std::ptrdiff_t>(region.plane_size())),
+          flow_plane(flow_of == nullptr ? 0
+                                        : static_cast<std::ptrdiff_t>(region.flow_plane_size())),
+          to_middle(region.middle.data() + at - y256),
+          layers(static_cast<std::int32_t>(region.layers_built)),
+          moved(moved_by),
+          bottom(bottom_of),
+          is_regular(region.irregular[at] == 0) {
+        while (k < layers && top() <= bottom) {
+            go_on();
+        }
     }
 
     std::int32_t top() const { return *y256 + moved; }
@@ -65,12 +83,12 @@ std::int32_t blend_of(const LayerRules& below, const LayerRules& rule, std::int3
                : std::max(1, (thickness * rule.blend + 128) >> 8);
 }
 
-/// The walk's layer and those above, to `end`, before which no overlay comes.
-[[gnu::always_inline]] inline void write_clear(LimitWriter& out, LayerWalk& walk,
+/// The walk's layer and those above, to `end`, before which no overlay comes. `shown` is what the
+/// limit before `to` shows, and becomes what the last one does.
+[[gnu::always_inline]] inline Limit* put_clear(Limit* to, LimitTail& shown, LayerWalk& walk,
                                                const LayerRules* rules, std::int32_t end) {
-    Limit* to = out.position();
     LimitTail tail = walk.tail();
-    if (out.goes_on_with(tail)) {
+    if (tail == shown) {
         --to;
     } else {
         put_limit(to++, walk.bottom, tail);
@@ -104,10 +122,11 @@ std::int32_t blend_of(const LayerRules& below, const LayerRules& rule, std::int3
         put_limit(to++, walk.bottom, tail);
         below = walk.k;
     }
-    out.set_position(to, walk.bottom, tail);
+    shown = tail;
+    return to;
 }
 
-/// Likewise where overlays come.
+/// The same where overlays come.
 [[gnu::always_inline]] inline void write_overlaid(LimitWriter& out, LayerWalk& walk,
                                                   const LayerRules* rules, std::int32_t end) {
     static constexpr LayerRules kNothingBelow{.alone = true};
@@ -205,6 +224,10 @@ void ColumnMaker::begin_row(std::int32_t z) {
     const std::ptrdiff_t first = (z + sources_.region.apron) * stride;
     const float* __restrict const banks = sources_.banks.data() + first;
     const std::int32_t count = shape.width;
+    const std::int32_t row = z + sources_.region.apron;
+    row_.at = static_cast<std::size_t>(first);
+    row_.field_at = sources_.field_first + static_cast<std::size_t>(row * sources_.field.stride());
+    row_.flow_at = static_cast<std::ptrdiff_t>(z) * sources_.region.flow_stride;
     std::int32_t* __restrict const top256 = row_.top256.data();
     for (std::int32_t i = 0; i < count; ++i) {
         top256[i] = std::max(to_256(banks[i]), 2 * kUnitsPerVoxel);
@@ -284,40 +307,32 @@ std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const 
     return place.flow_of(layers - 1);
 }
 
+/// What lies where the stack of layers ends below the ground.
+LimitTail ColumnMaker::above_stack(const Place& place) const {
+    const std::uint16_t soil = sources_.constants.palette.soil;
+    const auto last = static_cast<std::uint16_t>(sources_.region.layers_built - 1);
+    return tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last));
+}
+
 std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
                                      std::int32_t end) const {
-    static constexpr std::int32_t kNoFlow = 0;
-    const Region& region = sources_.region;
-    const std::int32_t* const y256 = region.y256.data() + place.at;
-    LayerWalk walk{.y256 = y256,
-                   .flow = place.flow == nullptr ? &kNoFlow : place.flow,
-                   .plane = static_cast<std::ptrdiff_t>(region.plane_size()),
-                   .flow_plane = place.flow == nullptr ? 0 : place.flow_plane,
-                   .to_middle = region.middle.data() + place.at - y256,
-                   .layers = static_cast<std::int32_t>(region.layers_built),
-                   .moved = block.moved,
-                   .bottom = block.bottom,
-                   .is_regular = region.irregular[place.at] == 0};
-    while (walk.k < walk.layers && walk.top() <= block.bottom) {
-        walk.go_on();
-    }
+    LayerWalk walk(sources_.region, place.at, place.flow, block.bottom, block.moved);
     if (walk.k < walk.layers) {
         // An overlay of the block below may reach into this one.
         if (end <= out.clear_to() && out.top() <= block.bottom) {
-            write_clear(out, walk, sources_.rules.data(), end);
+            LimitTail shown = out.shown();
+            Limit* const to = put_clear(out.position(), shown, walk, sources_.rules.data(), end);
+            out.set_position(to, walk.bottom, shown);
         } else {
             write_overlaid(out, walk, sources_.rules.data(), end);
         }
     }
     if (walk.bottom < end) {  // the stack ends below the ground
-        const std::uint16_t soil = sources_.constants.palette.soil;
-        const auto last = static_cast<std::uint16_t>(walk.layers - 1);
-        out.write(
-            {.bottom = walk.bottom,
-             .top = end,
-             .middle = walk.bottom,
-             .tail = tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last)),
-             .from = 0});
+        out.write({.bottom = walk.bottom,
+                   .top = end,
+                   .middle = walk.bottom,
+                   .tail = above_stack(place),
+                   .from = 0});
     }
     return static_cast<std::size_t>(std::min(walk.k, walk.layers - 1));
 }
@@ -353,14 +368,13 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
     Place place;
     place.column = x + region.apron;
     place.row = z + region.apron;
-    place.at = static_cast<std::size_t>(place.row * region.shape.stride() + place.column);
-    place.field_at = sources_.field_first +
-                     static_cast<std::size_t>(place.row * sources_.field.stride() + place.column);
+    place.at = row_.at + static_cast<std::size_t>(place.column);
+    place.field_at = row_.field_at + static_cast<std::size_t>(place.column);
     place.ground = sources_.banks[place.at];
     place.water = sources_.channels.water[place.at];
     place.top256 = row_.top256[static_cast<std::size_t>(place.column)];
     if (has_flow) {
-        place.flow = region.flow.data() + static_cast<std::ptrdiff_t>(z) * region.flow_stride + x;
+        place.flow = region.flow.data() + row_.flow_at + x;
         place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
     }
     return place;
@@ -377,33 +391,68 @@ void ColumnMaker::mark_elements(const Limits& limits, std::size_t first, std::si
     }
 }
 
-std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
-                               bool has_flow) {
-    const Place place = place_at(x, z, has_flow);
-    const auto planes = sources_.fractures.planes(place.field_at);
-    find_blocks(place, planes);
-    overlays_.clear();
-    const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
-    for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
-        find_lenses(place, blocks_[b]);
-    }
-    if (!planes.empty()) {
-        find_sheets(place, planes);
-    }
-    const Cover cover = cover_of(place);
-    const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
-    // The cover flows as what it lies on.
-    const bool on_overlay = !overlays_.is_empty() && overlays_.all().back().high == place.top256;
-    LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
-    overlays_.cut(rock_top);
-    const std::int32_t end = find_caves(place);
+Limit* ColumnMaker::reserve(Limits& limits, std::size_t used) const {
     const std::size_t most =
         used + LimitWriter::limits_max(block_count_ * (sources_.region.layers_built + 1) + 5,
                                        overlays_.size());
     if (limits.size() < most) {
         limits.resize(std::max(most, 2 * limits.size()));
     }
-    LimitWriter out(limits.data() + used, overlays_.all());
+    return limits.data() + used;
+}
+
+Limit* ColumnMaker::write_plain(Limit* to, const Place& place, const Cover& cover) const {
+    LimitTail shown = kNothingShown;
+    const auto lay = [&](std::int32_t from, std::int32_t top, LimitTail tail) {
+        if (from < top) {
+            if (tail == shown) {
+                --to;
+            } else {
+                put_limit(to++, from, tail);
+            }
+            put_limit(to++, top, tail);
+            shown = tail;
+        }
+    };
+    const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
+    LayerWalk walk(sources_.region, place.at, place.flow, 0, blocks_[0].moved);
+    if (walk.bottom < rock_top && walk.k < walk.layers) {
+        to = put_clear(to, shown, walk, sources_.rules.data(), rock_top);
+    }
+    if (walk.bottom < rock_top) {
+        lay(walk.bottom, rock_top, above_stack(place));
+    }
+    const LandscapePalette& palette = sources_.constants.palette;
+    if (rock_top < place.top256) {
+        // The cover flows as what it lies on.
+        while (walk.k + 1 < walk.layers && walk.top() < place.top256) {
+            walk.go_on();
+        }
+        const LimitTail flow = tail_of(
+            0, walk.k < walk.layers ? *walk.flow
+                                    : place.flow_of(static_cast<std::size_t>(walk.layers - 1)));
+        lay(cover.soil_from, cover.snow_from, flow | cover.soil);
+        lay(cover.snow_from, place.top256, flow | palette.snow);
+    }
+    std::int32_t top = place.top256;
+    if (place.water > kNoWater && palette.water != LandscapePalette::kNoEntry) {
+        const std::int32_t water = to_256(place.water);
+        lay(top, water, palette.water);
+        top = std::max(top, water);
+    }
+    put_limit(to++, top, sources_.world.void_id());
+    return to;
+}
+
+Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place& place,
+                                  const Cover& cover) {
+    const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
+    // The cover flows as what it lies on.
+    const bool on_overlay = !overlays_.is_empty() && overlays_.all().back().high == place.top256;
+    LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
+    overlays_.cut(rock_top);
+    const std::int32_t end = find_caves(place);
+    LimitWriter out(reserve(limits, used), overlays_.all());
     std::size_t layer = 0;  // the last of the last block
     for (std::size_t b = 0; b < block_count_; ++b) {
         const std::int32_t block_end = std::min({blocks_[b].top, rock_top, end});
@@ -424,7 +473,34 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
         lay(out.top(), to_256(place.water), palette.water);
     }
     write_overhang(out, place);
-    const Limit* const last = out.end(sources_.world.void_id());
+    return out.end(sources_.world.void_id());
+}
+
+std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
+                               bool has_flow) {
+    const Place place = place_at(x, z, has_flow);
+    const auto planes = sources_.fractures.planes(place.field_at);
+    if (planes.empty()) {
+        block_count_ = 1;
+        blocks_[0] = {
+            .bottom = 0, .top = place.top256, .moved = to_256(sources_.folds[place.field_at])};
+    } else {
+        find_blocks(place, planes);
+    }
+    overlays_.clear();
+    const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
+    for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
+        find_lenses(place, blocks_[b]);
+    }
+    if (!planes.empty()) {
+        find_sheets(place, planes);
+    }
+    const Cover cover = cover_of(place);
+    const bool is_plain = block_count_ == 1 && overlays_.is_empty() &&
+                          sources_.caves.gaps(place.at).empty() &&
+                          sources_.overhangs.at(place.at) == nullptr;
+    const Limit* const last = is_plain ? write_plain(reserve(limits, used), place, cover)
+                                       : write_crossed(limits, used, place, cover);
     const auto now = static_cast<std::size_t>(last - limits.data());
     // Only columns that lenses meet can show one.
     if (has_lenses) {

@@ -84,10 +84,17 @@ class ColumnMaker {
     float lowest_around(const Place& place) const;
     /// Returns where the column ends: a cave that is open to the sky is none.
     std::int32_t find_caves(const Place& place);
+    LimitTail above_stack(const Place& place) const;
     std::int32_t top_flow(const Place& place, std::size_t first) const;
     /// Up to `end`; returns the layer there.
     std::size_t write_block(LimitWriter& out, const Place& place, const Block& block,
                             std::int32_t end) const;
+    /// A column of one block, of layers, covers and open water only; returns its end.
+    Limit* write_plain(Limit* to, const Place& place, const Cover& cover) const;
+    /// Any other one, likewise.
+    Limit* write_crossed(Limits& limits, std::size_t used, const Place& place, const Cover& cover);
+    /// Room behind the first `used` limits for what a column can have.
+    Limit* reserve(Limits& limits, std::size_t used) const;
     void write_overhang(LimitWriter& out, const Place& place) const;
     /// Of limits first to end - 1.
     void mark_elements(const Limits& limits, std::size_t first, std::size_t end);
@@ -109,6 +116,9 @@ class ColumnMaker {
 
     /// Of a row of the region's shape; heights and thicknesses in 1/256 voxel.
     struct Row {
+        std::size_t at = 0;        ///< of its first column, in the region's rasters
+        std::size_t field_at = 0;  ///< likewise, in the field's
+        std::ptrdiff_t flow_at = 0;
         std::array<std::int32_t, kRectangleSideMax> top256{};
         std::array<std::int32_t, kRectangleSideMax> soil256{};  ///< or sand; 0: none
         std::array<std::int32_t, kRectangleSideMax> snow256{};
