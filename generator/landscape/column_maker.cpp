@@ -391,16 +391,6 @@ void ColumnMaker::mark_elements(const Limits& limits, std::size_t first, std::si
     }
 }
 
-Limit* ColumnMaker::reserve(Limits& limits, std::size_t used) const {
-    const std::size_t most =
-        used + LimitWriter::limits_max(block_count_ * (sources_.region.layers_built + 1) + 5,
-                                       overlays_.size());
-    if (limits.size() < most) {
-        limits.resize(std::max(most, 2 * limits.size()));
-    }
-    return limits.data() + used;
-}
-
 Limit* ColumnMaker::write_plain(Limit* to, const Place& place, const Cover& cover) const {
     LimitTail shown = kNothingShown;
     const auto lay = [&](std::int32_t from, std::int32_t top, LimitTail tail) {
@@ -452,7 +442,7 @@ Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place&
     LimitTail cover_flow = on_overlay ? overlays_.all().back().tail & ~LimitTail{0xffff} : 0;
     overlays_.cut(rock_top);
     const std::int32_t end = find_caves(place);
-    LimitWriter out(reserve(limits, used), overlays_.all());
+    LimitWriter out(reserve(limits, used, block_count_, overlays_.size()), overlays_.all());
     std::size_t layer = 0;  // the last of the last block
     for (std::size_t b = 0; b < block_count_; ++b) {
         const std::int32_t block_end = std::min({blocks_[b].top, rock_top, end});
@@ -499,7 +489,7 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
     const bool is_plain = block_count_ == 1 && overlays_.is_empty() &&
                           sources_.caves.gaps(place.at).empty() &&
                           sources_.overhangs.at(place.at) == nullptr;
-    const Limit* const last = is_plain ? write_plain(reserve(limits, used), place, cover)
+    const Limit* const last = is_plain ? write_plain(reserve(limits, used, 1, 0), place, cover)
                                        : write_crossed(limits, used, place, cover);
     const auto now = static_cast<std::size_t>(last - limits.data());
     // Only columns that lenses meet can show one.

@@ -93,8 +93,18 @@ class ColumnMaker {
     Limit* write_plain(Limit* to, const Place& place, const Cover& cover) const;
     /// Any other one, likewise.
     Limit* write_crossed(Limits& limits, std::size_t used, const Place& place, const Cover& cover);
+
     /// Room behind the first `used` limits for what a column can have.
-    Limit* reserve(Limits& limits, std::size_t used) const;
+    Limit* reserve(Limits& limits, std::size_t used, std::size_t blocks,
+                   std::size_t overlays) const {
+        const std::size_t runs = blocks * (sources_.region.layers_built + 1) + 5;
+        const std::size_t most = used + LimitWriter::limits_max(runs, overlays);
+        if (limits.size() < most) {
+            limits.resize(std::max(most, 2 * limits.size()));
+        }
+        return limits.data() + used;
+    }
+
     void write_overhang(LimitWriter& out, const Place& place) const;
     /// Of limits first to end - 1.
     void mark_elements(const Limits& limits, std::size_t first, std::size_t end);

@@ -84,6 +84,28 @@ bool can_meet(const Fracture& fracture, const RectangleShape& shape) {
            a_min < fracture.reach + kSlack && a_max > -fracture.reach - kSlack;
 }
 
+/// Columns first..end - 1 of a row.
+struct Columns {
+    std::int32_t first = 0;
+    std::int32_t end = 0;
+};
+
+/// Those of `columns` where at + slope * column can be within `most` of 0; with slack.
+Columns columns_within(const Columns& columns, float at, float slope, float most) {
+    constexpr float kLevel = 1e-3F;
+    if (std::abs(slope) < kLevel) {
+        return columns;
+    }
+    const float one = (-most - at) / slope;
+    const float other = (most - at) / slope;
+    const auto clamped = [&](float column) {
+        return static_cast<std::int32_t>(
+            std::clamp(column, static_cast<float>(columns.first), static_cast<float>(columns.end)));
+    };
+    return {.first = clamped(std::floor(std::min(one, other)) - 1.0F),
+            .end = clamped(std::floor(std::max(one, other)) + 3.0F)};
+}
+
 std::vector<Fracture> find_fractures(const FractureConstants& constants,
                                      const RectangleShape& shape) {
     std::vector<Fracture> found;
@@ -145,21 +167,15 @@ void FractureField::build(const FractureConstants& constants, const RectangleSha
         const auto x0 = static_cast<float>(shape.x0 - fracture.x);
         const auto z0 = static_cast<float>(shape.z0 - fracture.z);
         const auto step = static_cast<float>(shape.step);
-        // The box around its ellipse, tilted as it is; half of what is beyond it is slack.
-        const float most = fracture.length + fracture.reach + 2 * kWarp;
-        const auto within = [&](float start, std::int32_t count) {
-            const auto all = static_cast<float>(count);
-            const float from = std::floor((-most - start) / step);
-            const float to = std::floor((most - start) / step) + 2.0F;
-            return std::array{static_cast<std::int32_t>(std::clamp(from, 0.0F, all)),
-                              static_cast<std::int32_t>(std::clamp(to, 0.0F, all))};
-        };
-        const auto [first_column, end_column] = within(x0, shape.width);
-        const auto [first_row, end_row] = within(z0, shape.length);
-        for (std::int32_t row = first_row; row < end_row; ++row) {
+        for (std::int32_t row = 0; row < shape.length; ++row) {
             const float z = z0 + static_cast<float>(row) * step;
-            const std::size_t first = static_cast<std::size_t>(row * shape.stride());
-            for (std::int32_t column = first_column; column < end_column; ++column) {
+            const auto first = static_cast<std::size_t>(row * shape.stride());
+            Columns columns{.first = 0, .end = shape.width};
+            columns = columns_within(columns, x0 * fracture.along_x + z * fracture.along_z,
+                                     step * fracture.along_x, fracture.length + 1);
+            columns = columns_within(columns, z * fracture.along_x - x0 * fracture.along_z,
+                                     -step * fracture.along_z, fracture.reach + kWarp + 1);
+            for (std::int32_t column = columns.first; column < columns.end; ++column) {
                 const float x = x0 + static_cast<float>(column) * step;
                 const std::size_t i = first + static_cast<std::size_t>(column);
                 const float l = (x * fracture.along_x + z * fracture.along_z) / fracture.length;

@@ -51,17 +51,20 @@ RectangleShape missing_of(const RectangleShape& shape, const RectangleShape& kno
     return missing;
 }
 
-/// Copies what `from` has of the columns of `to`.
-void copy_common(LandFields& to, const LandFields& from, LandFields::Raster raster) {
+/// Copies what `from` has of row z of `to`; whole blocks, that run over into columns which come
+/// later.
+void copy_row(LandFields& to, const LandFields& from, LandFields::Raster raster, std::int64_t z) {
     const RectangleShape& a = from.shape;
     const RectangleShape& b = to.shape;
+    if (z < a.z0 || z >= a.z0 + a.length) {
+        return;
+    }
     const std::int64_t x0 = std::max(a.x0, b.x0);
-    const std::int64_t x1 = std::min(a.x0 + a.width, b.x0 + b.width);
-    const std::int64_t z1 = std::min(a.z0 + a.length, b.z0 + b.length);
-    for (std::int64_t z = std::max(a.z0, b.z0); z < z1; ++z) {
-        const float* const first = (from.*raster).data() + (z - a.z0) * a.stride() + (x0 - a.x0);
-        std::copy(first, first + (x1 - x0),
-                  (to.*raster).data() + (z - b.z0) * b.stride() + (x0 - b.x0));
+    const std::int64_t count = std::min(a.x0 + a.width, b.x0 + b.width) - x0;
+    const float* const first = (from.*raster).data() + (z - a.z0) * a.stride() + (x0 - a.x0);
+    float* const out = (to.*raster).data() + (z - b.z0) * b.stride() + (x0 - b.x0);
+    for (std::int64_t i = 0; i < count; i += kVectorPad) {
+        std::copy_n(first + i, kVectorPad, out + i);
     }
 }
 
@@ -106,6 +109,7 @@ const LandFields& LandFieldBuilder::build(const LandFieldConstants& constants,
         make(fields_, constants, shape, kernels, buffers);
         return fields_;
     }
+    strip_.shape = {};
     if (missing.width > 0 && missing.length > 0) {
         make(strip_, constants, missing, kernels, buffers);
     }
@@ -114,10 +118,13 @@ const LandFields& LandFieldBuilder::build(const LandFieldConstants& constants,
         (fields_.*LandFields::kRasters[r]).resize(shape.padded_size());
     }
     fields_.shape = shape;
+    const bool begins_before = missing.x0 > shape.x0 || missing.width == 0;
+    const LandFields& left = begins_before ? before_ : strip_;
+    const LandFields& right = begins_before ? strip_ : before_;
     for (std::size_t r = 0; r < rasters; ++r) {
-        copy_common(fields_, before_, LandFields::kRasters[r]);
-        if (missing.width > 0 && missing.length > 0) {
-            copy_common(fields_, strip_, LandFields::kRasters[r]);
+        for (std::int64_t z = shape.z0; z < shape.z0 + shape.length; ++z) {
+            copy_row(fields_, left, LandFields::kRasters[r], z);
+            copy_row(fields_, right, LandFields::kRasters[r], z);
         }
     }
     fields_.is_smooth = before_.is_smooth;

@@ -62,69 +62,27 @@ void dilate(std::vector<float>& highest, std::vector<float>& rows, std::vector<f
     dilate_by(highest, static_cast<std::size_t>(shape.stride()));
 }
 
-constexpr auto kReachMax = static_cast<std::int32_t>(kOverhangMax);  ///< columns
+static_assert(2 * static_cast<std::int32_t>(kOverhangMax) < kVectorPad, "a row of lips is a block");
 
-/// Distances to columns so far away along x and z.
-struct Distances {
-    float of[kReachMax + 1][kReachMax + 1];
-
-    Distances() {
-        for (std::int32_t z = 0; z <= kReachMax; ++z) {
-            for (std::int32_t x = 0; x <= kReachMax; ++x) {
-                of[z][x] = std::sqrt(static_cast<float>(x * x + z * z));
-            }
+/// Distances to columns so far away, a block of them for each row from the middle's on.
+std::vector<float> lip_distances(std::int32_t reach) {
+    constexpr float kFar = 1e9F;
+    std::vector<float> distances(static_cast<std::size_t>((reach + 1) * kVectorPad), kFar);
+    for (std::int32_t z = 0; z <= reach; ++z) {
+        for (std::int32_t x = -reach; x <= reach; ++x) {
+            distances[static_cast<std::size_t>(z * kVectorPad + reach + x)] =
+                std::sqrt(static_cast<float>(x * x + z * z));
         }
     }
-};
-
-/// The nearest lip of a layer's top at `raw_top` around a column, as a share of what that lip
-/// reaches; 1 if there is none so near. Rows and columns from the middle outwards, as far as they
-/// can come nearer still: a lip never reaches farther than `farthest`.
-struct LipSearch {
-    const float* over;
-    const float* row_highest;  ///< of `over` in the row within `reach` columns
-    const float* moved;
-    const float* reaches;
-    std::ptrdiff_t stride;
-    std::int32_t reach;
-    float farthest;
-    Distances distances = {};
-
-    float nearest(std::ptrdiff_t center, float raw_top) const {
-        float e = 1;
-        for (std::int32_t dz = 0; dz <= reach && static_cast<float>(dz) < e * farthest; ++dz) {
-            e = nearest_in_row(e, center, dz, raw_top);
-            if (dz > 0) {
-                e = nearest_in_row(e, center, -dz, raw_top);
-            }
-        }
-        return e;
-    }
-
-  private:
-    float nearest_in_row(float e, std::ptrdiff_t center, std::int32_t dz, float raw_top) const {
-        const std::ptrdiff_t row = center + dz * stride;
-        if (row_highest[row] < raw_top) {
-            return e;
-        }
-        const float* const distance = distances.of[dz < 0 ? -dz : dz];
-        for (std::int32_t dx = 0; dx <= reach && distance[dx] < e * farthest; ++dx) {
-            for (const std::ptrdiff_t j : {row - dx, row + dx}) {
-                if (over[j] >= raw_top &&
-                    std::abs(moved[j] - moved[center]) <= 0.4F * distance[dx]) {
-                    e = std::min(e, distance[dx] / reaches[j]);
-                }
-            }
-        }
-        return e;
-    }
-};
+    return distances;
+}
 
 }  // namespace
 
 OverhangConstants::OverhangConstants(const WorldDefinition& definition,
                                      const ResistanceConstants& resistance)
     : reach(definition.relief.height > 0 ? definition.relief.overhang : 0),
+      distances(lip_distances(reach)),
       noise(Noise::make(key(definition.seed, LandscapeTag::soil, 1), 40, 2)) {
     for (std::size_t k = 1; k < resistance.layers.size(); ++k) {
         if (resistance.layers[k].resistance > kHard &&
@@ -222,13 +180,6 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
     for (std::size_t i = 0; i < size; ++i) {
         reach_[i] = most * clamp01(0.6F + 1.6F * reach_[i]) + 0.5F;
     }
-    const LipSearch lips{.over = over_.data(),
-                         .row_highest = row_highest_.data(),
-                         .moved = input.moved,
-                         .reaches = reach_.data(),
-                         .stride = field.stride(),
-                         .reach = constants.reach,
-                         .farthest = most + 0.5F};
     const LayerHeights layers{.first = region.heights.data(), .plane = region.plane_size()};
     overhangs_.assign(shape.padded_size(), {});
     const auto margin_x = static_cast<std::int32_t>(shape.x0 - field.x0);
@@ -247,7 +198,17 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
                 if (*top + input.moved[center] <= ground[i] + kGapLeast) {
                     continue;  // no lip of it would be high enough
                 }
-                const float e = lips.nearest(static_cast<std::ptrdiff_t>(center), raw_top);
+                const std::size_t begin = center - static_cast<std::size_t>(constants.reach);
+                const float e =
+                    kernels.landscape->nearest_lip({.over = over_.data() + begin,
+                                                    .row_highest = row_highest_.data() + center,
+                                                    .moved = input.moved + begin,
+                                                    .reaches = reach_.data() + begin,
+                                                    .distances = constants.distances.data(),
+                                                    .stride = field.stride(),
+                                                    .reach = constants.reach,
+                                                    .raw_top = raw_top,
+                                                    .moved_here = input.moved[center]});
                 const float lip = *top + input.moved[center] - 1.5F * e;
                 const float bottom = lip - (0.45F * thickness * (1.0F - e * e) + 1.2F);
                 if (e < 1 && lip > ground[i] + kGapLeast) {

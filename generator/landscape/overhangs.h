@@ -26,6 +26,7 @@ struct OverhangConstants {
     std::int32_t reach = 0;  ///< columns; 0: none
     /// Layers that can lean out, bottom first: at most every second one, so 32.
     std::vector<std::size_t> ledges;
+    std::vector<float> distances;  ///< of columns within `reach`, see LipPlace
     Noise noise;
 
     OverhangConstants(const WorldDefinition& definition, const ResistanceConstants& resistance);

@@ -271,6 +271,35 @@ LedgeSeen ledge(const LedgeRow& row) {
     return {any_leans, any_lower};
 }
 
+float nearest_lip(const LipPlace& place) {
+    float nearest[kBlock];
+    for (std::int32_t i = 0; i < kBlock; ++i) {
+        nearest[i] = 1.0F;
+    }
+    for (std::int32_t z = -place.reach; z <= place.reach; ++z) {
+        const std::int64_t row = z * place.stride;
+        if (place.row_highest[row] < place.raw_top) {
+            continue;
+        }
+        const float* __restrict const over = place.over + row;
+        const float* __restrict const moved = place.moved + row;
+        const float* __restrict const reaches = place.reaches + row;
+        const float* __restrict const distance = place.distances + (z < 0 ? -z : z) * kBlock;
+        for (std::int32_t i = 0; i < kBlock; ++i) {
+            const bool is_lip =
+                static_cast<int>(over[i] >= place.raw_top) &
+                static_cast<int>(absolute(moved[i] - place.moved_here) <= 0.4F * distance[i]);
+            const float share = is_lip ? distance[i] / reaches[i] : 1.0F;
+            nearest[i] = share < nearest[i] ? share : nearest[i];
+        }
+    }
+    float least = nearest[0];
+    for (std::int32_t i = 1; i < kBlock; ++i) {
+        least = nearest[i] < least ? nearest[i] : least;
+    }
+    return least;
+}
+
 void tube(const TubeRow& row, const TubePiece& piece) {
     constexpr float kFlatFloor = 0.62F;
     constexpr float kCeiling = 0.95F;
@@ -319,6 +348,7 @@ const LandscapeKernels kLandscapeKernels = {.erode = erode,
                                             .resist = resist,
                                             .raise_tops = raise_tops,
                                             .ledge = ledge,
+                                            .nearest_lip = nearest_lip,
                                             .tube = tube};
 
 }  // namespace terrane::TERRANE_KERNEL_SET

@@ -124,6 +124,21 @@ struct LayerResistance {
     float concave = 0;     ///< e
 };
 
+/// Where lips are looked for, see generator/landscape/overhangs.h; places are the first column of
+/// those within `reach` in the middle's own row.
+struct LipPlace {
+    const float* over = nullptr;
+    const float* row_highest = nullptr;  ///< of the row, at its middle
+    const float* moved = nullptr;
+    const float* reaches = nullptr;
+    const float* distances = nullptr;  ///< kVectorPad for each row from the middle's on, far ones
+                                       ///< where nothing is looked for
+    std::int64_t stride = 0;
+    std::int32_t reach = 0;  ///< columns, at most (kVectorPad - 1) / 2
+    float raw_top = 0;
+    float moved_here = 0;
+};
+
 /// A layer that may lean out over a row of columns, see generator/landscape/overhangs.h.
 struct LedgeRow {
     std::uint32_t* lean = nullptr;  ///< gets `bit` where it may
@@ -165,6 +180,8 @@ struct LandscapeKernels {
                        std::int32_t count);
     /// Where a layer may lean out.
     LedgeSeen (*ledge)(const LedgeRow& row);
+    /// The nearest lip that is no lower than raw_top, as a share of what it reaches; at most 1.
+    float (*nearest_lip)(const LipPlace& place);
     /// Lowers floors and raises lids to what a piece of a tube hollows out.
     void (*tube)(const TubeRow& row, const TubePiece& piece);
 };
