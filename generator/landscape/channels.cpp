@@ -158,6 +158,7 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     out.nearness.assign(size, kFar);
     out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
+    out.near.clear();
     if (relief.is_smooth && constants.rivers > 0) {
         find_near(out.near, constants, relief, rivers, shape, kernels);
         for (const NearReach& near : out.near) {
@@ -184,13 +185,18 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
             }
         }
     }
-    out.is_wet = false;
+    if (out.near.empty() && constants.sea == kNoWater) {
+        out.is_wet = false;
+        return;
+    }
+    std::int32_t wet = 0;
     for (std::size_t i = 0; i < size; ++i) {
         const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;
         const float water = std::max(river, constants.sea);
+        wet |= static_cast<std::int32_t>(water > ground[i]);
         out.water[i] = water > ground[i] ? water : kNoWater;
-        out.is_wet = out.is_wet || water > ground[i];
     }
+    out.is_wet = wet != 0;
 }
 
 }  // namespace terrane

@@ -478,10 +478,10 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
         find_blocks(place, planes);
     }
     overlays_.clear();
-    const bool has_lenses = sources_.region.gap_mask[place.at] != 0;
-    for (std::size_t b = 0; has_lenses && b < block_count_; ++b) {
+    for (std::size_t b = 0; sources_.region.gap_mask[place.at] != 0 && b < block_count_; ++b) {
         find_lenses(place, blocks_[b]);
     }
+    const bool has_lenses = !overlays_.is_empty();
     if (!planes.empty()) {
         find_sheets(place, planes);
     }
@@ -492,7 +492,6 @@ std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x,
     const Limit* const last = is_plain ? write_plain(reserve(limits, used, 1, 0), place, cover)
                                        : write_crossed(limits, used, place, cover);
     const auto now = static_cast<std::size_t>(last - limits.data());
-    // Only columns that lenses meet can show one.
     if (has_lenses) {
         mark_elements(limits, used, now);
     }

@@ -41,34 +41,22 @@ CellPoint point_of(std::uint64_t hash, std::int64_t dx, std::int64_t dz) {
 /// The points of the 3 x 3 cells around each column's, for rows whose cell is `cell_z`.
 void fill_points(float* points, std::size_t plane, const ErosionBuffers& buffers,
                  std::int64_t cell_z) {
-    const std::vector<std::int64_t>& cells = buffers.cells;
-    const std::size_t width = cells.size();
-    std::size_t point = 0;
-    for (std::int64_t dz = -1; dz <= 1; ++dz) {
-        for (std::int64_t dx = -1; dx <= 1; ++dx, ++point) {
-            float* const px = points + point * plane;
-            float* const pz = px + kErosionPoints * plane;
-            const auto hash_at = [&](std::size_t column) {
-                return key(buffers.hashes[column][static_cast<std::size_t>(dx + 1)], cell_z + dz);
-            };
-            for (std::size_t column = 0; buffers.is_sparse && column < width; ++column) {
-                const CellPoint found = point_of(hash_at(column), dx, dz);
-                px[column] = found.x;
-                pz[column] = found.z;
-            }
-            for (std::size_t column = 0; !buffers.is_sparse && column < width;) {
-                const CellPoint found = point_of(hash_at(column), dx, dz);
-                const std::int64_t cell = cells[column];
-                for (; column < width && cells[column] == cell; ++column) {
+    for (std::size_t r = 0; r < buffers.runs.size(); ++r) {
+        const ErosionRun& run = buffers.runs[r];
+        // The last one goes on to the end of the padding.
+        const std::size_t end = r + 1 < buffers.runs.size() ? buffers.runs[r + 1].first : plane;
+        float* px = points;
+        for (std::int64_t dz = -1; dz <= 1; ++dz) {
+            for (std::int64_t dx = -1; dx <= 1; ++dx, px += plane) {
+                const CellPoint found = point_of(
+                    key(run.hashes[static_cast<std::size_t>(dx + 1)], cell_z + dz), dx, dz);
+                float* const pz = px + kErosionPoints * plane;
+                for (std::size_t column = run.first; column < end; ++column) {
                     px[column] = found.x;
                     pz[column] = found.z;
                 }
             }
         }
-    }
-    for (std::size_t one = 0; one < 2 * kErosionPoints; ++one) {
-        float* const row = points + one * plane;
-        std::fill(row + width, row + plane, row[width - 1]);
     }
 }
 
@@ -124,24 +112,19 @@ void run_octave(float* sum, const Slopes& slopes, const GullyOctave& octave,
     const auto plane = static_cast<std::size_t>(shape.stride());
     float* const fraction_x = buffers.points.data();
     float* const points = fraction_x + plane;
-    buffers.cells.resize(static_cast<std::size_t>(shape.width));
-    buffers.hashes.resize(static_cast<std::size_t>(shape.width));
-    std::int32_t runs = 0;  // of columns in one cell
+    buffers.runs.clear();
+    std::int64_t newest = 0;
     for (std::int32_t i = 0; i < shape.width; ++i) {
         const CellPlace place = cell_place(shape.x0 + i * shape.step, octave.frequency);
-        const auto column = static_cast<std::size_t>(i);
-        buffers.cells[column] = place.cell;
-        if (i > 0 && place.cell == buffers.cells[column - 1]) {
-            buffers.hashes[column] = buffers.hashes[column - 1];
-        } else {
-            ++runs;
-            buffers.hashes[column] = {key(octave.seed, place.cell - 1),
-                                      key(octave.seed, place.cell),
-                                      key(octave.seed, place.cell + 1)};
+        if (i == 0 || place.cell != newest) {
+            newest = place.cell;
+            buffers.runs.push_back(
+                {.first = static_cast<std::size_t>(i),
+                 .hashes = {key(octave.seed, place.cell - 1), key(octave.seed, place.cell),
+                            key(octave.seed, place.cell + 1)}});
         }
         fraction_x[i] = place.fraction;
     }
-    buffers.is_sparse = 2 * runs > shape.width;
     std::fill(fraction_x + shape.width, fraction_x + plane, fraction_x[shape.width - 1]);
     std::int64_t filled = 0;
     for (std::int32_t z = 0; z < shape.length; ++z) {

@@ -23,6 +23,7 @@
 #include "generator/world/world_definition.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -50,14 +51,18 @@ struct ErosionConstants {
     explicit ErosionConstants(const WorldDefinition& definition);
 };
 
+/// Columns of one cell, up to the next run's.
+struct ErosionRun {
+    std::size_t first = 0;
+    std::array<std::uint64_t, 3> hashes{};  ///< of the cells before, at and after
+};
+
 /// Memory of `erode`; one thread's.
 struct ErosionBuffers {
     std::vector<float> floats;
     std::vector<float> points;
     std::vector<ErosionBound> bounds;
-    std::vector<std::int64_t> cells;
-    std::vector<std::array<std::uint64_t, 3>> hashes;  ///< of the cells before, at and after
-    bool is_sparse = false;                            ///< most columns have a cell of their own
+    std::vector<ErosionRun> runs;
 };
 
 /// coarse[i], fine[i]: what the filter adds to column i, in voxels, before it is scaled by how

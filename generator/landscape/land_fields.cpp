@@ -11,60 +11,94 @@ struct Interval {
     std::int64_t first = 0;
     std::int64_t end = 0;
 
-    std::int64_t count() const { return end - first; }
+    std::int32_t count() const { return static_cast<std::int32_t>(end - first); }
 
-    friend bool operator==(const Interval&, const Interval&) = default;
+    bool holds(const Interval& other) const { return first <= other.first && end >= other.end; }
 };
 
-/// What of `wanted` is missing of what is `known`, if that is one interval; else all of it.
-Interval missing_of(const Interval& wanted, const Interval& known) {
-    if (known.first <= wanted.first && known.end > wanted.first) {
-        return {.first = std::min(known.end, wanted.end), .end = wanted.end};
+Interval along_x(const RectangleShape& shape) {
+    return {.first = shape.x0, .end = shape.x0 + shape.width};
+}
+
+Interval along_z(const RectangleShape& shape) {
+    return {.first = shape.z0, .end = shape.z0 + shape.length};
+}
+
+/// What is common to both.
+Interval common(const Interval& a, const Interval& b) {
+    return {.first = std::max(a.first, b.first), .end = std::min(a.end, b.end)};
+}
+
+/// `wanted` without the end that is `known`; nothing if all is, and all if only its middle is.
+Interval without(const Interval& wanted, const Interval& known) {
+    if (known.first <= wanted.first) {
+        return {.first = std::clamp(known.end, wanted.first, wanted.end), .end = wanted.end};
     }
-    if (known.end >= wanted.end && known.first < wanted.end) {
-        return {.first = wanted.first, .end = known.first};
+    if (known.end >= wanted.end) {
+        return {.first = wanted.first, .end = std::min(known.first, wanted.end)};
     }
     return wanted;
 }
 
-/// The part of `shape` that must be made beside what is `known`: a strip or all of it.
-RectangleShape missing_of(const RectangleShape& shape, const RectangleShape& known) {
-    RectangleShape missing = shape;
-    if (shape.step != 1 || known.step != 1) {
-        return missing;
+/// `shape` without what `known` has of it, if that is a rectangle again.
+RectangleShape without(const RectangleShape& shape, const RectangleShape& known) {
+    RectangleShape left = shape;
+    if (along_z(known).holds(along_z(shape))) {
+        const Interval x = without(along_x(shape), along_x(known));
+        left.x0 = x.first;
+        left.width = x.count();
+    } else if (along_x(known).holds(along_x(shape))) {
+        const Interval z = without(along_z(shape), along_z(known));
+        left.z0 = z.first;
+        left.length = z.count();
     }
-    const auto along_x = [](const RectangleShape& of) {
-        return Interval{.first = of.x0, .end = of.x0 + of.width};
-    };
-    const auto along_z = [](const RectangleShape& of) {
-        return Interval{.first = of.z0, .end = of.z0 + of.length};
-    };
-    if (along_z(shape) == along_z(known)) {
-        const Interval x = missing_of(along_x(shape), along_x(known));
-        missing.x0 = x.first;
-        missing.width = static_cast<std::int32_t>(x.count());
-    } else if (along_x(shape) == along_x(known)) {
-        const Interval z = missing_of(along_z(shape), along_z(known));
-        missing.z0 = z.first;
-        missing.length = static_cast<std::int32_t>(z.count());
-    }
-    return missing;
+    return left;
 }
 
-/// Copies what `from` has of row z of `to`; whole blocks, that run over into columns which come
-/// later.
-void copy_row(LandFields& to, const LandFields& from, LandFields::Raster raster, std::int64_t z) {
+bool is_empty(const RectangleShape& shape) {
+    return shape.width == 0 || shape.length == 0;
+}
+
+/// Columns that are made for a shape, whole blocks of them.
+std::int32_t made_for(const RectangleShape& shape) {
+    return padded_width(shape.width) * shape.length;
+}
+
+/// Without a call: there are many short ones.
+void copy_short(float* to, const float* from, std::int32_t count) {
+    constexpr std::int32_t kHalf = kVectorPad / 2;
+    std::int32_t i = 0;
+    for (; i + kVectorPad <= count; i += kVectorPad) {
+        std::copy_n(from + i, kVectorPad, to + i);
+    }
+    if (i + kHalf <= count) {
+        std::copy_n(from + i, kHalf, to + i);
+        i += kHalf;
+    }
+    for (; i + 2 <= count; i += 2) {
+        std::copy_n(from + i, 2, to + i);
+    }
+    if (i < count) {
+        to[i] = from[i];
+    }
+}
+
+/// Copies what `from` has of `to`.
+void copy_common(LandFields& to, const LandFields& from, std::size_t rasters) {
     const RectangleShape& a = from.shape;
     const RectangleShape& b = to.shape;
-    if (z < a.z0 || z >= a.z0 + a.length) {
+    const Interval x = common(along_x(a), along_x(b));
+    const Interval z = common(along_z(a), along_z(b));
+    if (x.first >= x.end || z.first >= z.end) {
         return;
     }
-    const std::int64_t x0 = std::max(a.x0, b.x0);
-    const std::int64_t count = std::min(a.x0 + a.width, b.x0 + b.width) - x0;
-    const float* const first = (from.*raster).data() + (z - a.z0) * a.stride() + (x0 - a.x0);
-    float* const out = (to.*raster).data() + (z - b.z0) * b.stride() + (x0 - b.x0);
-    for (std::int64_t i = 0; i < count; i += kVectorPad) {
-        std::copy_n(first + i, kVectorPad, out + i);
+    for (std::size_t r = 0; r < rasters; ++r) {
+        const float* const first = (from.*LandFields::kRasters[r]).data();
+        float* const out = (to.*LandFields::kRasters[r]).data();
+        for (std::int64_t row = z.first; row < z.end; ++row) {
+            copy_short(out + (row - b.z0) * b.stride() + (x.first - b.x0),
+                       first + (row - a.z0) * a.stride() + (x.first - a.x0), x.count());
+        }
     }
 }
 
@@ -73,11 +107,11 @@ void copy_row(LandFields& to, const LandFields& from, LandFields::Raster raster,
 void LandFieldBuilder::make(LandFields& out, const LandFieldConstants& constants,
                             const RectangleShape& shape, const RowKernels& kernels,
                             NoiseBuffers& buffers) {
-    out.shape = shape;
     const std::size_t size = shape.padded_size();
     out.folds.resize(size);
     fold_rectangle(out.folds.data(), constants.folds, shape, kernels, buffers);
     if (!constants.has_relief) {
+        out.shape = shape;
         return;
     }
     out.raw.resize(size);
@@ -93,6 +127,7 @@ void LandFieldBuilder::make(LandFields& out, const LandFieldConstants& constants
     std::swap(out.wander_x, relief_.wander_x);
     std::swap(out.wander_z, relief_.wander_z);
     out.is_smooth = relief_.is_smooth;
+    out.shape = shape;
 }
 
 const LandFields& LandFieldBuilder::build(const LandFieldConstants& constants,
@@ -101,34 +136,39 @@ const LandFields& LandFieldBuilder::build(const LandFieldConstants& constants,
     if (constants.has_relief) {
         relief_builder_.find_rivers(constants.relief, shape);
     }
-    std::swap(fields_, before_);
-    const RectangleShape missing = missing_of(shape, before_.shape);
-    // Nothing is known until all is: memory may run out on the way.
-    fields_.shape = {};
-    if (padded_width(missing.width) * missing.length >= padded_width(shape.width) * shape.length) {
-        make(fields_, constants, shape, kernels, buffers);
-        return fields_;
+    // In the oldest one's place. Nothing is known of it until all is: memory may run out on the
+    // way.
+    next_ = shape.step == 1 ? (next_ + 1) % kKept : next_;
+    LandFields& fields = shape.step == 1 ? kept_[next_] : coarse_;
+    fields.shape = {};
+    RectangleShape missing = shape;
+    sources_.clear();
+    for (std::size_t age = 1; age < kKept && shape.step == 1 && !is_empty(missing); ++age) {
+        const LandFields& one = kept_[(next_ + kKept - age) % kKept];
+        const RectangleShape left = without(missing, one.shape);
+        if (made_for(left) < made_for(missing)) {
+            sources_.push_back(&one);
+            missing = left;
+        }
     }
-    strip_.shape = {};
-    if (missing.width > 0 && missing.length > 0) {
+    if (sources_.empty()) {
+        make(fields, constants, shape, kernels, buffers);
+        return fields;
+    }
+    if (!is_empty(missing)) {
         make(strip_, constants, missing, kernels, buffers);
+        sources_.push_back(&strip_);
     }
     const std::size_t rasters = constants.has_relief ? LandFields::kRasters.size() : 1;
     for (std::size_t r = 0; r < rasters; ++r) {
-        (fields_.*LandFields::kRasters[r]).resize(shape.padded_size());
+        (fields.*LandFields::kRasters[r]).resize(shape.padded_size());
     }
-    fields_.shape = shape;
-    const bool begins_before = missing.x0 > shape.x0 || missing.width == 0;
-    const LandFields& left = begins_before ? before_ : strip_;
-    const LandFields& right = begins_before ? strip_ : before_;
-    for (std::size_t r = 0; r < rasters; ++r) {
-        for (std::int64_t z = shape.z0; z < shape.z0 + shape.length; ++z) {
-            copy_row(fields_, left, LandFields::kRasters[r], z);
-            copy_row(fields_, right, LandFields::kRasters[r], z);
-        }
+    fields.is_smooth = sources_.front()->is_smooth;
+    fields.shape = shape;  // nothing can fail from here on
+    for (const LandFields* source : sources_) {
+        copy_common(fields, *source, rasters);
     }
-    fields_.is_smooth = before_.is_smooth;
-    return fields_;
+    return fields;
 }
 
 }  // namespace terrane

@@ -1,9 +1,9 @@
 // What a landscape knows of each column before it asks the rock: folds, and the relief with its
 // gullies.
 //
-// Regions of neighbours overlap by their margins, more than a fourth of all columns of a chunk's
-// stack. What the region before had is not made again where a strip of it is missing only: values
-// are functions of their column alone.
+// Regions of neighbours overlap by their margins: of the columns that a chunk's stack looks at, not
+// half are its own. So the fields of the last regions are kept, and what they have is not made
+// again: values are functions of their column alone.
 #pragma once
 
 #include "generator/landscape/erosion.h"
@@ -41,7 +41,8 @@ struct LandFieldConstants {
     bool has_relief = false;
 };
 
-/// Builds fields for one worker; keeps the last ones, its rivers and buffers.
+/// Builds fields for one worker; keeps the last ones (some 60 KB each), its rivers and
+/// buffers.
 class LandFieldBuilder {
   public:
     /// Builds the fields of `shape`; valid until the next ones are built.
@@ -55,9 +56,14 @@ class LandFieldBuilder {
     void make(LandFields& out, const LandFieldConstants& constants, const RectangleShape& shape,
               const RowKernels& kernels, NoiseBuffers& buffers);
 
-    LandFields fields_;
-    LandFields before_;
-    LandFields strip_;  ///< what is missing
+    /// Stacks of a row of some sixteen, and those beside them in the row after it.
+    static constexpr std::size_t kKept = 18;
+
+    std::array<LandFields, kKept> kept_;  ///< of level 0
+    std::size_t next_ = 0;                ///< the newest
+    LandFields coarse_;                   ///< of other levels
+    LandFields strip_;                    ///< what was missing
+    std::vector<const LandFields*> sources_;
     ReliefBuilder relief_builder_;
     ReliefRasters relief_;
     ErosionBuffers erosion_;
