@@ -17,6 +17,23 @@ constexpr float kLeastCover = 0.25F;  ///< voxels
 constexpr float kLeastSand = 1.2F;    ///< voxels
 constexpr float kBeach = 1.5F;        ///< voxels around the sea's level
 
+/// Squares of the slopes of a row of columns, but for its first and last one.
+void slope_squares(float* __restrict square, const float* __restrict ground, std::ptrdiff_t stride,
+                   float per_column, std::int32_t count) {
+    const float* __restrict const before = ground - stride;
+    const float* __restrict const after = ground + stride;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float x = (ground[i + 1] - ground[i - 1]) * per_column;
+        const float z = (after[i] - before[i]) * per_column;
+        square[i] = x * x + z * z;
+    }
+}
+
+/// A cover's thickness in 1/256 voxel; thin ones are none.
+std::int32_t thickness256(float thickness) {
+    return thickness >= kLeastCover ? to_256(thickness) : 0;
+}
+
 /// Up the layers of a block. Its functions are inlined where it is a local: what moves stays in
 /// registers.
 struct LayerWalk {
@@ -38,18 +55,18 @@ struct LayerWalk {
         flow += flow_plane;
     }
 
-    LayerWalk(const Region& region, std::size_t at, const std::int32_t* flow_of,
-              std::int32_t bottom_of, std::int32_t moved_by)
-        : y256(region.y256.data() + at),
-          flow(flow_of == nullptr ? &kNoFlow : flow_of),
-          plane(static_cast<std::ptrdiff_t>(region.plane_size())),
-          flow_plane(flow_of == nullptr ? 0
-                                        : static_cast<std::ptrdiff_t>(region.flow_plane_size())),
-          to_middle(region.middle.data() + at - y256),
-          layers(static_cast<std::int32_t>(region.layers_built)),
+    LayerWalk(const LayerRow& row, std::size_t column, bool has_flow, std::int32_t bottom_of,
+              std::int32_t moved_by)
+        : y256(row.y256 + column),
+          flow(has_flow ? row.flow + (static_cast<std::ptrdiff_t>(column) - row.flow_first)
+                        : &kNoFlow),
+          plane(row.plane),
+          flow_plane(has_flow ? row.flow_plane : 0),
+          to_middle(row.to_middle),
+          layers(row.layers),
           moved(moved_by),
           bottom(bottom_of),
-          is_regular(region.irregular[at] == 0) {
+          is_regular(row.irregular[column] == 0) {
         while (k < layers && top() <= bottom) {
             go_on();
         }
@@ -209,88 +226,98 @@ void ColumnMaker::find_blocks(const Place& place, std::span<const PlaneInColumn>
     }
 }
 
-/// What lies on the ground: where it begins, in 1/256 voxel.
-struct ColumnMaker::Cover {
-    std::int32_t soil_from = 0;  ///< or sand; the column's top: there is none
-    std::int32_t snow_from = 0;
-    std::uint16_t soil = 0;
-};
-
 /// Tops and covers of the columns of a row, side by side so that it goes by vectors.
 void ColumnMaker::begin_row(std::int32_t z) {
-    const LandscapeConstants& constants = sources_.constants;
-    const RectangleShape& shape = sources_.region.shape;
-    const std::ptrdiff_t stride = shape.stride();
-    const std::ptrdiff_t first = (z + sources_.region.apron) * stride;
-    const float* __restrict const banks = sources_.banks.data() + first;
-    const std::int32_t count = shape.width;
-    const std::int32_t row = z + sources_.region.apron;
+    const Region& region = sources_.region;
+    const std::int32_t row = z + region.apron;
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(row) * region.shape.stride();
     row_.at = static_cast<std::size_t>(first);
     row_.field_at = sources_.field_first + static_cast<std::size_t>(row * sources_.field.stride());
-    row_.flow_at = static_cast<std::ptrdiff_t>(z) * sources_.region.flow_stride;
+    row_.layers = {.y256 = region.y256.data() + first,
+                   .irregular = region.irregular.data() + first,
+                   .plane = static_cast<std::ptrdiff_t>(region.plane_size()),
+                   .to_middle = region.middle.data() - region.y256.data(),
+                   .flow_first = region.apron,
+                   .layers = static_cast<std::int32_t>(region.layers_built)};
+    if (z >= 0 && z < region.inner.length) {
+        row_.layers.flow = region.flow.data() + static_cast<std::ptrdiff_t>(z) * region.flow_stride;
+        row_.layers.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
+    }
+    const float* __restrict const banks = sources_.banks.data() + first;
+    const std::int32_t count = region.shape.width;
     std::int32_t* __restrict const top256 = row_.top256.data();
     for (std::int32_t i = 0; i < count; ++i) {
         top256[i] = std::max(to_256(banks[i]), 2 * kUnitsPerVoxel);
     }
-    if (!constants.has_relief) {
-        return;
+    row_.soil_from = row_.snow_from = row_.top256;
+    if (sources_.constants.has_relief) {
+        find_covers(first);
     }
-    const float per_column = 0.5F / static_cast<float>(shape.step);
-    const float* __restrict const ground = sources_.ground.data() + first;
-    const float* __restrict const before = ground - stride;
-    const float* __restrict const after = ground + stride;
+    if (sources_.constants.has_snow && sources_.constants.has_relief) {
+        find_snow(first);
+    }
+}
+
+/// Soil and sand of the row whose columns are from `first` on.
+void ColumnMaker::find_covers(std::ptrdiff_t first) {
+    const LandscapeConstants& constants = sources_.constants;
+    const RectangleShape& shape = sources_.region.shape;
+    std::array<float, kRectangleSideMax> squares;
+    slope_squares(squares.data(), sources_.ground.data() + first, shape.stride(),
+                  0.5F / static_cast<float>(shape.step), shape.width);
+    const float* __restrict const banks = sources_.banks.data() + first;
     const float* __restrict const noise = sources_.soil.data() + first;
     const float* __restrict const crest = sources_.crest.data() + first;
     const float* __restrict const nearness = sources_.channels.nearness.data() + first;
-    const float* __restrict const water = sources_.channels.water.data() + first;
-    std::int32_t* __restrict const soil256 = row_.soil256.data();
-    std::int32_t* __restrict const snow256 = row_.snow256.data();
-    std::int32_t* __restrict const is_sand = row_.is_sand.data();
-    const auto thickness256 = [](float thickness) {
-        return thickness >= kLeastCover ? to_256(thickness) : 0;
-    };
+    const std::int32_t* __restrict const top256 = row_.top256.data();
+    std::int32_t* __restrict const soil_from = row_.soil_from.data();
+    std::int32_t* __restrict const soil_of = row_.soil.data();
     const float most_soil = constants.soil;
     const float beach = constants.sea + kBeach;
+    const std::int32_t count = shape.width;
+    const std::int32_t soil_id = constants.palette.soil;
+    const std::int32_t sand_id = constants.palette.sand;
+    // What the world does not have is 0 voxels thick.
+    const std::int32_t soil_bits = soil_id != LandscapePalette::kNoEntry ? -1 : 0;
+    const std::int32_t sand_bits = sand_id != LandscapePalette::kNoEntry ? -1 : 0;
     for (std::int32_t i = 1; i + 1 < count; ++i) {
-        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
-        const float slope_z = (after[i] - before[i]) * per_column;
-        const float square = slope_x * slope_x + slope_z * slope_z;
+        const float square = squares[static_cast<std::size_t>(i)];
         const float soil = most_soil * (1.0F - square / kSteepestSoil) *
                            (0.6F + 0.4F * clamp01(1.0F - crest[i])) * (1.0F + 0.6F * noise[i]);
         const auto by_water = static_cast<std::int32_t>(nearness[i] < kSandWidths) |
                               static_cast<std::int32_t>(banks[i] < beach);
         const std::int32_t sand = by_water & static_cast<std::int32_t>(square < kSteepestSnow);
-        is_sand[i] = sand;
-        soil256[i] = thickness256(sand != 0 ? std::max(kLeastSand, soil) : soil);
-    }
-    if (!constants.has_snow) {
-        return;
-    }
-    const float snow_line = constants.snow_line;
-    for (std::int32_t i = 1; i + 1 < count; ++i) {
-        const float slope_x = (ground[i + 1] - ground[i - 1]) * per_column;
-        const float slope_z = (after[i] - before[i]) * per_column;
-        const float square = slope_x * slope_x + slope_z * slope_z;
-        const float above = (banks[i] - snow_line + kSnowLineNoise * noise[i]) * (1.0F / 12.0F);
-        const float snow = kSnow * clamp01(above) * (1.0F - square / kSteepestSnow);
-        snow256[i] = water[i] == kNoWater ? thickness256(snow) : 0;
+        const std::int32_t thickness = thickness256(sand != 0 ? std::max(kLeastSand, soil) : soil) &
+                                       (sand != 0 ? sand_bits : soil_bits);
+        soil_of[i] = sand != 0 ? sand_id : soil_id;
+        soil_from[i] = std::max(0, top256[i] - thickness);
     }
 }
 
-ColumnMaker::Cover ColumnMaker::cover_of(const Place& place) const {
-    Cover cover{.soil_from = place.top256, .snow_from = place.top256};
-    if (sources_.constants.has_relief) {
-        const LandscapePalette& palette = sources_.constants.palette;
-        const auto i = static_cast<std::size_t>(place.column);
-        cover.soil = row_.is_sand[i] != 0 ? palette.sand : palette.soil;
-        if (cover.soil != LandscapePalette::kNoEntry) {
-            cover.soil_from = std::max(0, place.top256 - row_.soil256[i]);
-        }
-        if (palette.snow != LandscapePalette::kNoEntry) {
-            cover.snow_from = std::max(0, place.top256 - row_.snow256[i]);
-        }
+/// Likewise its snow.
+void ColumnMaker::find_snow(std::ptrdiff_t first) {
+    const LandscapeConstants& constants = sources_.constants;
+    if (constants.palette.snow == LandscapePalette::kNoEntry) {
+        return;
     }
-    return cover;
+    const RectangleShape& shape = sources_.region.shape;
+    std::array<float, kRectangleSideMax> squares;
+    slope_squares(squares.data(), sources_.ground.data() + first, shape.stride(),
+                  0.5F / static_cast<float>(shape.step), shape.width);
+    const float* __restrict const banks = sources_.banks.data() + first;
+    const float* __restrict const noise = sources_.soil.data() + first;
+    const float* __restrict const water = sources_.channels.water.data() + first;
+    const std::int32_t* __restrict const top256 = row_.top256.data();
+    std::int32_t* __restrict const snow_from = row_.snow_from.data();
+    const float snow_line = constants.snow_line;
+    const std::int32_t count = shape.width;
+    for (std::int32_t i = 1; i + 1 < count; ++i) {
+        const float above = (banks[i] - snow_line + kSnowLineNoise * noise[i]) * (1.0F / 12.0F);
+        const float snow =
+            kSnow * clamp01(above) * (1.0F - squares[static_cast<std::size_t>(i)] / kSteepestSnow);
+        const std::int32_t thickness = water[i] == kNoWater ? thickness256(snow) : 0;
+        snow_from[i] = std::max(0, top256[i] - thickness);
+    }
 }
 
 /// The packed flow of the layer at the ground, which is `first` or higher.
@@ -308,15 +335,16 @@ std::int32_t ColumnMaker::top_flow(const Place& place, std::size_t first) const 
 }
 
 /// What lies where the stack of layers ends below the ground.
-LimitTail ColumnMaker::above_stack(const Place& place) const {
+LimitTail ColumnMaker::above_stack(std::int32_t last_flow) const {
     const std::uint16_t soil = sources_.constants.palette.soil;
     const auto last = static_cast<std::uint16_t>(sources_.region.layers_built - 1);
-    return tail_of(soil != LandscapePalette::kNoEntry ? soil : last, place.flow_of(last));
+    return tail_of(soil != LandscapePalette::kNoEntry ? soil : last, last_flow);
 }
 
 std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const Block& block,
                                      std::int32_t end) const {
-    LayerWalk walk(sources_.region, place.at, place.flow, block.bottom, block.moved);
+    LayerWalk walk(row_.layers, static_cast<std::size_t>(place.column), place.flow != nullptr,
+                   block.bottom, block.moved);
     if (walk.k < walk.layers) {
         // An overlay of the block below may reach into this one.
         if (end <= out.clear_to() && out.top() <= block.bottom) {
@@ -331,7 +359,7 @@ std::size_t ColumnMaker::write_block(LimitWriter& out, const Place& place, const
         out.write({.bottom = walk.bottom,
                    .top = end,
                    .middle = walk.bottom,
-                   .tail = above_stack(place),
+                   .tail = above_stack(place.flow_of(sources_.region.layers_built - 1)),
                    .from = 0});
     }
     return static_cast<std::size_t>(std::min(walk.k, walk.layers - 1));
@@ -374,8 +402,8 @@ ColumnMaker::Place ColumnMaker::place_at(std::int32_t x, std::int32_t z, bool ha
     place.water = sources_.channels.water[place.at];
     place.top256 = row_.top256[static_cast<std::size_t>(place.column)];
     if (has_flow) {
-        place.flow = region.flow.data() + row_.flow_at + x;
-        place.flow_plane = static_cast<std::ptrdiff_t>(region.flow_plane_size());
+        place.flow = row_.layers.flow + x;
+        place.flow_plane = row_.layers.flow_plane;
     }
     return place;
 }
@@ -391,7 +419,7 @@ void ColumnMaker::mark_elements(const Limits& limits, std::size_t first, std::si
     }
 }
 
-Limit* ColumnMaker::write_plain(Limit* to, const Place& place, const Cover& cover) const {
+Limit* ColumnMaker::write_plain(Limit* to, std::size_t i, std::int32_t moved, bool has_flow) const {
     LimitTail shown = kNothingShown;
     const auto lay = [&](std::int32_t from, std::int32_t top, LimitTail tail) {
         if (from < top) {
@@ -404,38 +432,39 @@ Limit* ColumnMaker::write_plain(Limit* to, const Place& place, const Cover& cove
             shown = tail;
         }
     };
+    const Cover cover = cover_of(i);
     const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
-    LayerWalk walk(sources_.region, place.at, place.flow, 0, blocks_[0].moved);
+    LayerWalk walk(row_.layers, i, has_flow, 0, moved);
     if (walk.bottom < rock_top && walk.k < walk.layers) {
         to = put_clear(to, shown, walk, sources_.rules.data(), rock_top);
     }
-    if (walk.bottom < rock_top) {
-        lay(walk.bottom, rock_top, above_stack(place));
-    }
+    // Where the stack ends below the ground, its last layer's flow goes on.
+    const std::ptrdiff_t beyond = walk.k < walk.layers ? 0 : walk.flow_plane;
     const LandscapePalette& palette = sources_.constants.palette;
-    if (rock_top < place.top256) {
+    if (walk.bottom < rock_top) {
+        lay(walk.bottom, rock_top, above_stack(*(walk.flow - beyond)));
+    }
+    std::int32_t top = row_.top256[i];
+    if (rock_top < top) {
         // The cover flows as what it lies on.
-        while (walk.k + 1 < walk.layers && walk.top() < place.top256) {
+        while (walk.k + 1 < walk.layers && walk.top() < top) {
             walk.go_on();
         }
-        const LimitTail flow = tail_of(
-            0, walk.k < walk.layers ? *walk.flow
-                                    : place.flow_of(static_cast<std::size_t>(walk.layers - 1)));
+        const LimitTail flow = tail_of(0, *(walk.flow - beyond));
         lay(cover.soil_from, cover.snow_from, flow | cover.soil);
-        lay(cover.snow_from, place.top256, flow | palette.snow);
+        lay(cover.snow_from, top, flow | palette.snow);
     }
-    std::int32_t top = place.top256;
-    if (place.water > kNoWater && palette.water != LandscapePalette::kNoEntry) {
-        const std::int32_t water = to_256(place.water);
-        lay(top, water, palette.water);
-        top = std::max(top, water);
+    const float water = sources_.channels.water[row_.at + i];
+    if (water > kNoWater && palette.water != LandscapePalette::kNoEntry) {
+        lay(top, to_256(water), palette.water);
+        top = std::max(top, to_256(water));
     }
     put_limit(to++, top, sources_.world.void_id());
     return to;
 }
 
-Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place& place,
-                                  const Cover& cover) {
+Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place& place) {
+    const Cover cover = cover_of(static_cast<std::size_t>(place.column));
     const std::int32_t rock_top = std::min(cover.soil_from, cover.snow_from);
     // The cover flows as what it lies on.
     const bool on_overlay = !overlays_.is_empty() && overlays_.all().back().high == place.top256;
@@ -468,30 +497,32 @@ Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place&
 
 std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
                                bool has_flow) {
-    const Place place = place_at(x, z, has_flow);
-    const auto planes = sources_.fractures.planes(place.field_at);
-    if (planes.empty()) {
-        block_count_ = 1;
-        blocks_[0] = {
-            .bottom = 0, .top = place.top256, .moved = to_256(sources_.folds[place.field_at])};
-    } else {
-        find_blocks(place, planes);
+    const auto column = static_cast<std::size_t>(x + sources_.region.apron);
+    const std::size_t at = row_.at + column;
+    const std::size_t field_at = row_.field_at + column;
+    const auto planes = sources_.fractures.planes(field_at);
+    const bool is_alone = sources_.caves.gaps(at).empty() && sources_.overhangs.at(at) == nullptr;
+    const bool meets_lenses = sources_.region.gap_mask[at] != 0;
+    const auto used_by = [&](const Limit* end) {
+        return static_cast<std::size_t>(end - limits.data());
+    };
+    if (is_alone && !meets_lenses && planes.empty()) {
+        return used_by(write_plain(reserve(limits, used, 1, 0), column,
+                                   to_256(sources_.folds[field_at]), has_flow));
     }
+    const Place place = place_at(x, z, has_flow);
+    find_blocks(place, planes);
     overlays_.clear();
-    for (std::size_t b = 0; sources_.region.gap_mask[place.at] != 0 && b < block_count_; ++b) {
+    for (std::size_t b = 0; meets_lenses && b < block_count_; ++b) {
         find_lenses(place, blocks_[b]);
     }
     const bool has_lenses = !overlays_.is_empty();
-    if (!planes.empty()) {
-        find_sheets(place, planes);
+    find_sheets(place, planes);
+    if (is_alone && block_count_ == 1 && overlays_.is_empty()) {
+        return used_by(
+            write_plain(reserve(limits, used, 1, 0), column, blocks_[0].moved, has_flow));
     }
-    const Cover cover = cover_of(place);
-    const bool is_plain = block_count_ == 1 && overlays_.is_empty() &&
-                          sources_.caves.gaps(place.at).empty() &&
-                          sources_.overhangs.at(place.at) == nullptr;
-    const Limit* const last = is_plain ? write_plain(reserve(limits, used, 1, 0), place, cover)
-                                       : write_crossed(limits, used, place, cover);
-    const auto now = static_cast<std::size_t>(last - limits.data());
+    const std::size_t now = used_by(write_crossed(limits, used, place));
     if (has_lenses) {
         mark_elements(limits, used, now);
     }

@@ -36,6 +36,18 @@ struct ColumnSources {
     std::size_t field_first = 0;  ///< where the shape's first column lies in the field's rasters
 };
 
+/// The layers of a row of columns.
+struct LayerRow {
+    const std::int32_t* y256 = nullptr;  ///< of the lowest layer's tops
+    const std::int32_t* flow = nullptr;  ///< of the first column that has some
+    const std::uint8_t* irregular = nullptr;
+    std::ptrdiff_t plane = 0;
+    std::ptrdiff_t flow_plane = 0;
+    std::ptrdiff_t to_middle = 0;  ///< from a layer's top to where it has blended
+    std::int32_t flow_first = 0;   ///< which column that is
+    std::int32_t layers = 0;
+};
+
 class ColumnMaker {
   public:
     /// `element_ids`: those that show in some column become 0; `element_limits` gets the numbers of
@@ -72,35 +84,50 @@ class ColumnMaker {
         }
     };
 
-    struct Cover;
+    /// What lies on the ground: where it begins, in 1/256 voxel.
+    struct Cover {
+        std::int32_t soil_from = 0;  ///< or sand; the column's top: there is none
+        std::int32_t snow_from = 0;
+        std::uint16_t soil = 0;
+    };
+
     struct Block;
 
     Place place_at(std::int32_t x, std::int32_t z, bool has_flow) const;
     void find_blocks(const Place& place, std::span<const PlaneInColumn> planes);
     void find_lenses(const Place& place, const Block& block);
     void find_sheets(const Place& place, std::span<const PlaneInColumn> planes);
-    Cover cover_of(const Place& place) const;
+
+    Cover cover_of(std::size_t i) const {
+        return {.soil_from = row_.soil_from[i],
+                .snow_from = row_.snow_from[i],
+                .soil = static_cast<std::uint16_t>(row_.soil[i])};
+    }
+
+    void find_covers(std::ptrdiff_t first);
+    void find_snow(std::ptrdiff_t first);
     bool is_by_water(const Place& place) const;
     float lowest_around(const Place& place) const;
     /// Returns where the column ends: a cave that is open to the sky is none.
     std::int32_t find_caves(const Place& place);
-    LimitTail above_stack(const Place& place) const;
+    LimitTail above_stack(std::int32_t last_flow) const;
     std::int32_t top_flow(const Place& place, std::size_t first) const;
     /// Up to `end`; returns the layer there.
     std::size_t write_block(LimitWriter& out, const Place& place, const Block& block,
                             std::int32_t end) const;
-    /// A column of one block, of layers, covers and open water only; returns its end.
-    Limit* write_plain(Limit* to, const Place& place, const Cover& cover) const;
+    /// Column `i` of the row, of one block that was `moved`, of layers, covers and open water only;
+    /// returns its end.
+    Limit* write_plain(Limit* to, std::size_t i, std::int32_t moved, bool has_flow) const;
     /// Any other one, likewise.
-    Limit* write_crossed(Limits& limits, std::size_t used, const Place& place, const Cover& cover);
+    Limit* write_crossed(Limits& limits, std::size_t used, const Place& place);
 
     /// Room behind the first `used` limits for what a column can have.
-    Limit* reserve(Limits& limits, std::size_t used, std::size_t blocks,
-                   std::size_t overlays) const {
+    Limit* reserve(Limits& limits, std::size_t used, std::size_t blocks, std::size_t overlays) {
         const std::size_t runs = blocks * (sources_.region.layers_built + 1) + 5;
         const std::size_t most = used + LimitWriter::limits_max(runs, overlays);
-        if (limits.size() < most) {
+        if (room_ < most) {
             limits.resize(std::max(most, 2 * limits.size()));
+            room_ = limits.size();
         }
         return limits.data() + used;
     }
@@ -122,17 +149,18 @@ class ColumnMaker {
 
     std::array<Block, kPlanesPerColumnMax + 1> blocks_{};
     std::size_t block_count_ = 0;
+    std::size_t room_ = 0;  ///< so many limits at least there is room for
     Overlays overlays_;
 
-    /// Of a row of the region's shape; heights and thicknesses in 1/256 voxel.
+    /// Of a row of the region's shape; heights in 1/256 voxel.
     struct Row {
         std::size_t at = 0;        ///< of its first column, in the region's rasters
         std::size_t field_at = 0;  ///< likewise, in the field's
-        std::ptrdiff_t flow_at = 0;
+        LayerRow layers;
         std::array<std::int32_t, kRectangleSideMax> top256{};
-        std::array<std::int32_t, kRectangleSideMax> soil256{};  ///< or sand; 0: none
-        std::array<std::int32_t, kRectangleSideMax> snow256{};
-        std::array<std::int32_t, kRectangleSideMax> is_sand{};
+        std::array<std::int32_t, kRectangleSideMax> soil_from{};  ///< see Cover
+        std::array<std::int32_t, kRectangleSideMax> snow_from{};
+        std::array<std::int32_t, kRectangleSideMax> soil{};
     } row_;
 };
 

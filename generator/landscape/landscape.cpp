@@ -332,7 +332,7 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
     *end_of++ = 0;
     out.element_ids.assign(region.elements.size(), kNoPaletteId);
     out.element_limits.clear();
-    out.highest_y256 = 0;
+    std::int32_t highest = 0;
     ColumnMaker maker({.world = *world_,
                        .constants = constants_,
                        .rules = constants.rules,
@@ -353,15 +353,17 @@ void Landscape::write(const ColumnWriterOutput& out, const Region& region,
     std::size_t used = 0;
     for (std::int32_t z = -apron; z < rectangle.length + apron; ++z) {
         maker.begin_row(z);
+        const bool is_inner_row = z >= 0 && z < rectangle.length;
         for (std::int32_t x = -apron; x < rectangle.width + apron; ++x) {
-            const bool is_inner = x >= 0 && z >= 0 && x < rectangle.width && z < rectangle.length;
+            const bool is_inner = is_inner_row && x >= 0 && x < rectangle.width;
             used = maker.write(grid.limits, used, x, z, is_inner);
             *end_of++ = static_cast<std::uint32_t>(used);
             if (is_inner) {
-                out.highest_y256 = std::max(out.highest_y256, grid.limits[used - 1].y256);
+                highest = std::max(highest, grid.limits[used - 1].y256);
             }
         }
     }
+    out.highest_y256 = highest;
     grid.limits.resize(used);
     number_elements(out, region, *world_);
 }
