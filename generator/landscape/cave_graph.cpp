@@ -102,6 +102,75 @@ Tube make_tube(const CaveConstants& constants, const CaveNode& from, const CaveN
     return tube;
 }
 
+/// The nodes of a rectangle of cells, made when they are first asked for.
+class CaveNodes {
+  public:
+    CaveNodes(const CaveConstants& constants, const FoldConstants& folds, const CaveCells& cells)
+        : constants_(constants),
+          folds_(folds),
+          cells_(cells),
+          nodes_(static_cast<std::size_t>((cells.width + 1) * (cells.length + 1))) {}
+
+    const std::optional<CaveNode>& at(std::int64_t i, std::int64_t j, std::size_t level) {
+        auto& of_cell = nodes_[static_cast<std::size_t>((j - cells_.first_j) * (cells_.width + 1) +
+                                                        (i - cells_.first_i))];
+        for (std::size_t l = of_cell.size(); l < constants_.horizons.size(); ++l) {
+            of_cell.push_back(make_node(constants_, folds_, i, j, l));
+        }
+        return of_cell[level];
+    }
+
+  private:
+    const CaveConstants& constants_;
+    const FoldConstants& folds_;
+    CaveCells cells_;
+    std::vector<std::vector<std::optional<CaveNode>>> nodes_;
+};
+
+/// What begins in cell (i, j).
+void fill_cell(CaveCell& cell, const CaveConstants& constants, CaveNodes& nodes, std::int64_t i,
+               std::int64_t j) {
+    cell.tubes.clear();
+    cell.dolines.clear();
+    const std::size_t levels = constants.horizons.size();
+    for (std::size_t level = 0; level < levels; ++level) {
+        const auto from = nodes.at(i, j, level);
+        if (!from) {
+            continue;
+        }
+        const auto join = [&](bool wanted, std::int64_t to_i, std::int64_t to_j,
+                              std::size_t to_level, Link link) {
+            if (!wanted) {
+                return;
+            }
+            if (const auto to = nodes.at(to_i, to_j, to_level)) {
+                cell.tubes.push_back(make_tube(constants, *from, *to, link));
+            }
+        };
+        join(from->east, i + 1, j, level, Link::east);
+        join(from->south, i, j + 1, level, Link::south);
+        join(from->diagonal, i + 1, j + 1, level, Link::diagonal);
+        join(from->up && level + 1 < levels, i, j, level + 1, Link::up);
+        if (from->opens) {
+            cell.dolines.push_back({.x = from->x,
+                                    .z = from->z,
+                                    .y = from->y,
+                                    .radius = std::max(2.0F, 0.6F * from->radius)});
+        }
+    }
+}
+
+/// The cells whose tubes reach a shape.
+CaveCells cells_around(const RectangleShape& shape, std::int64_t cell) {
+    const std::int64_t i0 = floor_div(shape.x0, cell) - kCellsBefore;
+    const std::int64_t j0 = floor_div(shape.z0, cell) - kCellsBefore;
+    const std::int64_t i1 =
+        floor_div(shape.x0 + (shape.width - 1) * shape.step, cell) + kCellsAfter;
+    const std::int64_t j1 =
+        floor_div(shape.z0 + (shape.length - 1) * shape.step, cell) + kCellsAfter;
+    return {.first_i = i0, .first_j = j0, .width = i1 - i0 + 1, .length = j1 - j0 + 1};
+}
+
 }  // namespace
 
 CaveConstants::CaveConstants(const WorldDefinition& definition, const LayerStack& stack)
@@ -138,78 +207,26 @@ void CaveGraph::build(const CaveConstants& constants, const FoldConstants& folds
     if (constants.cell == 0 || constants.horizons.empty()) {
         return;
     }
-    const std::int64_t i0 = floor_div(shape.x0, constants.cell) - kCellsBefore;
-    const std::int64_t j0 = floor_div(shape.z0, constants.cell) - kCellsBefore;
-    const std::int64_t i1 =
-        floor_div(shape.x0 + (shape.width - 1) * shape.step, constants.cell) + kCellsAfter;
-    const std::int64_t j1 =
-        floor_div(shape.z0 + (shape.length - 1) * shape.step, constants.cell) + kCellsAfter;
-    const std::int64_t width = i1 - i0 + 1;
-    const std::int64_t length = j1 - j0 + 1;
-    if (i0 == first_i_ && j0 == first_j_ && width == width_ && length == length_) {
+    const CaveCells wanted = cells_around(shape, constants.cell);
+    if (wanted == known_) {
         return;
     }
-    const std::size_t levels = constants.horizons.size();
-    // A cell's nodes, made when they are first asked for.
-    std::vector<std::vector<std::optional<CaveNode>>> nodes(
-        static_cast<std::size_t>((width + 1) * (length + 1)));
-    const auto node = [&](std::int64_t i, std::int64_t j, std::size_t level) {
-        auto& of_cell = nodes[static_cast<std::size_t>((j - j0) * (width + 1) + (i - i0))];
-        for (std::size_t l = of_cell.size(); l < levels; ++l) {
-            of_cell.push_back(make_node(constants, folds, i, j, l));
-        }
-        return of_cell[level];
-    };
-    const auto fill = [&](CaveCell& cell, std::int64_t i, std::int64_t j) {
-        cell.tubes.clear();
-        cell.dolines.clear();
-        for (std::size_t level = 0; level < levels; ++level) {
-            const auto from = node(i, j, level);
-            if (!from) {
-                continue;
-            }
-            const auto join = [&](bool wanted, std::int64_t to_i, std::int64_t to_j,
-                                  std::size_t to_level, Link link) {
-                if (!wanted) {
-                    return;
-                }
-                if (const auto to = node(to_i, to_j, to_level)) {
-                    cell.tubes.push_back(make_tube(constants, *from, *to, link));
-                }
-            };
-            join(from->east, i + 1, j, level, Link::east);
-            join(from->south, i, j + 1, level, Link::south);
-            join(from->diagonal, i + 1, j + 1, level, Link::diagonal);
-            join(from->up && level + 1 < levels, i, j, level + 1, Link::up);
-            if (from->opens) {
-                cell.dolines.push_back({.x = from->x,
-                                        .z = from->z,
-                                        .y = from->y,
-                                        .radius = std::max(2.0F, 0.6F * from->radius)});
-            }
-        }
-    };
+    CaveNodes nodes(constants, folds, wanted);
     // Nothing is known until all is: memory may run out on the way.
-    const std::int64_t known_width = std::exchange(width_, 0);
-    const std::int64_t known_length = std::exchange(length_, 0);
+    const CaveCells known = std::exchange(known_, {});
     std::swap(cells_, before_);
-    cells_.resize(static_cast<std::size_t>(width * length));
-    for (std::int64_t j = j0; j <= j1; ++j) {
-        for (std::int64_t i = i0; i <= i1; ++i) {
-            CaveCell& cell = cells_[static_cast<std::size_t>((j - j0) * width + (i - i0))];
-            if (i >= first_i_ && i < first_i_ + known_width && j >= first_j_ &&
-                j < first_j_ + known_length) {
-                std::swap(cell, before_[static_cast<std::size_t>((j - first_j_) * known_width +
-                                                                 (i - first_i_))]);
+    cells_.resize(static_cast<std::size_t>(wanted.width * wanted.length));
+    for (std::int64_t j = wanted.first_j; j < wanted.first_j + wanted.length; ++j) {
+        for (std::int64_t i = wanted.first_i; i < wanted.first_i + wanted.width; ++i) {
+            CaveCell& cell = cells_[wanted.index(i, j)];
+            if (known.holds(i, j)) {
+                std::swap(cell, before_[known.index(i, j)]);
             } else {
-                fill(cell, i, j);
+                fill_cell(cell, constants, nodes, i, j);
             }
         }
     }
-    first_i_ = i0;
-    first_j_ = j0;
-    width_ = width;
-    length_ = length;
+    known_ = wanted;
 }
 
 }  // namespace terrane

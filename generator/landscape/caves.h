@@ -23,6 +23,7 @@
 #include "generator/world/world_definition.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -82,6 +83,24 @@ struct CaveCell {
     std::vector<Doline> dolines;
 };
 
+/// A rectangle of cells, by row.
+struct CaveCells {
+    std::int64_t first_i = 0;
+    std::int64_t first_j = 0;
+    std::int64_t width = 0;
+    std::int64_t length = 0;
+
+    bool holds(std::int64_t i, std::int64_t j) const {
+        return i >= first_i && i < first_i + width && j >= first_j && j < first_j + length;
+    }
+
+    std::size_t index(std::int64_t i, std::int64_t j) const {
+        return static_cast<std::size_t>((j - first_j) * width + (i - first_i));
+    }
+
+    friend bool operator==(const CaveCells&, const CaveCells&) = default;
+};
+
 /// Everything that can be met in a rectangle of columns, cells ascending. Kept from region to
 /// region: neighbours ask for the same cells, or for most of them.
 class CaveGraph {
@@ -92,10 +111,7 @@ class CaveGraph {
     std::span<const CaveCell> cells() const { return cells_; }
 
   private:
-    std::int64_t first_i_ = 0;
-    std::int64_t first_j_ = 0;
-    std::int64_t width_ = 0;
-    std::int64_t length_ = 0;
+    CaveCells known_;
     std::vector<CaveCell> cells_;
     std::vector<CaveCell> before_;
 };

@@ -109,6 +109,11 @@ float gap(float low, float high, float other_low, float other_high) {
     return std::max(0.0F, std::max(low - other_high, other_low - high));
 }
 
+/// Rivers farther away than this count for nothing; columns.
+float reach_of(const ReliefConstants& constants) {
+    return 1.1F * constants.valley;
+}
+
 float mountain_of(float noise) {
     return 0.1F + 0.9F * smooth_step(-0.2F, 0.3F, noise);
 }
@@ -180,17 +185,8 @@ void ReliefBuilder::find_rivers(const ReliefConstants& relief, const RectangleSh
     rivers_.build(constants, {.first_i = i0, .last_i = i1, .first_j = j0, .last_j = j1});
 }
 
-/// Up to kTilesTogether x kTilesTogether tiles: near reaches are looked for once for all of them.
-void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
-                               const LatticeTile& first, const RowKernels& kernels) {
-    const RiverConstants& rivers = constants.rivers;
-    const std::size_t stride = x.stride();
-    const std::size_t plane = stride * z.lines.size() + kVectorPad;
-    const float* const wander_x = lattice_.data() + 4 * plane;
-    const float* const wander_z = wander_x + plane;
-    const std::int64_t origin_x = x.lines[first.first_x];
-    const std::int64_t origin_z = z.lines[first.first_z];
-
+/// Up to kTilesTogether x kTilesTogether tiles, and where their points are moved to.
+struct ReliefBuilder::Tiles {
     struct Tile {
         ValleyPlaces places;
         std::array<MovedPlace, kVectorPad> moved_to;
@@ -198,66 +194,98 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
     };
 
     std::array<Tile, kTilesTogether * kTilesTogether> tiles;
-    std::size_t tile_count = 0;
-    std::int64_t x_min = INT64_MAX;
+    std::size_t count = 0;
+    std::int64_t origin_x = 0;  ///< of their places
+    std::int64_t origin_z = 0;
+    std::int64_t x_min = INT64_MAX;  ///< of all places
     std::int64_t x_max = INT64_MIN;
     std::int64_t z_min = INT64_MAX;
     std::int64_t z_max = INT64_MIN;
-    for (std::size_t t = 0; t < tiles.size(); ++t) {
+
+    void add(Tile& tile, std::size_t n, const MovedPlace& place) {
+        tile.moved_to[n] = place;
+        tile.places.x[n] = static_cast<float>(place.x - origin_x);
+        tile.places.z[n] = static_cast<float>(place.z - origin_z);
+        tile.places.x_rest[n] = place.x_rest;
+        tile.places.z_rest[n] = place.z_rest;
+        x_min = std::min(x_min, place.x);
+        x_max = std::max(x_max, place.x + 1);
+        z_min = std::min(z_min, place.z);
+        z_max = std::max(z_max, place.z + 1);
+    }
+};
+
+ReliefBuilder::Tiles ReliefBuilder::place_tiles(const Axis& x, const Axis& z,
+                                                const LatticeTile& first) const {
+    const std::size_t stride = x.stride();
+    const std::size_t plane = stride * z.lines.size() + kVectorPad;
+    const float* const wander_x = lattice_.data() + 4 * plane;
+    const float* const wander_z = wander_x + plane;
+    Tiles tiles;
+    tiles.origin_x = x.lines[first.first_x];
+    tiles.origin_z = z.lines[first.first_z];
+    for (std::size_t t = 0; t < tiles.tiles.size(); ++t) {
         const std::size_t tile_x = first.first_x + t % kTilesTogether * first.width;
         const std::size_t tile_z = first.first_z + t / kTilesTogether * first.length;
         if (tile_x >= x.lines.size() || tile_z >= z.lines.size()) {
             continue;
         }
-        Tile& tile = tiles[tile_count++];
+        Tiles::Tile& tile = tiles.tiles[tiles.count++];
         for (std::size_t n = 0; n < kVectorPad; ++n) {
             // Beyond the tile's or the lattice's end, the last points once more.
             const std::size_t row = std::min(n / first.width, first.length - 1);
             const std::size_t line_x = std::min(tile_x + n % first.width, x.lines.size() - 1);
             const std::size_t line_z = std::min(tile_z + row, z.lines.size() - 1);
-            tile.at[n] = line_z * stride + line_x;
-            tile.moved_to[n] =
-                moved(x.lines[line_x], z.lines[line_z], wander_x[tile.at[n]], wander_z[tile.at[n]]);
-            const MovedPlace& place = tile.moved_to[n];
-            tile.places.x[n] = static_cast<float>(place.x - origin_x);
-            tile.places.z[n] = static_cast<float>(place.z - origin_z);
-            tile.places.x_rest[n] = place.x_rest;
-            tile.places.z_rest[n] = place.z_rest;
-            x_min = std::min(x_min, place.x);
-            x_max = std::max(x_max, place.x + 1);
-            z_min = std::min(z_min, place.z);
-            z_max = std::max(z_max, place.z + 1);
+            const std::size_t at = line_z * stride + line_x;
+            tile.at[n] = at;
+            tiles.add(tile, n, moved(x.lines[line_x], z.lines[line_z], wander_x[at], wander_z[at]));
         }
     }
-    const float reach = 1.1F * constants.valley;
-    const float slack = reach + 1.0F;  // far above rounding errors: what is left out weighs 0
+    return tiles;
+}
+
+/// Reaches that come near some of the tiles' places.
+void ReliefBuilder::find_near(const ReliefConstants& constants, const Tiles& tiles) {
+    const RiverConstants& rivers = constants.rivers;
+    const float slack =
+        reach_of(constants) + 1.0F;  // far above rounding errors: what is left out weighs 0
     const Reach& reference = rivers_.reaches().front();
     near_.clear();
-    rivers_.for_each_meeting({.first_i = rivers.cell_of(x_min, 1) - kRiverReachCells,
-                              .last_i = rivers.cell_of(x_max, 0) + kRiverReachCells,
-                              .first_j = rivers.row_of(z_min) - kRiverReachCells,
-                              .last_j = rivers.row_of(z_max) + kRiverReachCells},
-                             {.x_min = static_cast<float>(x_min - reference.x) - slack,
-                              .x_max = static_cast<float>(x_max - reference.x) + slack,
-                              .z_min = static_cast<float>(z_min - reference.z) - slack,
-                              .z_max = static_cast<float>(z_max - reference.z) + slack},
-                             [&](const Reach& one) {
-                                 const auto x_of = static_cast<float>(one.x - origin_x);
-                                 const auto z_of = static_cast<float>(one.z - origin_z);
-                                 const float gap_x = gap(x_of + one.x_min, x_of + one.x_max,
-                                                         static_cast<float>(x_min - origin_x),
-                                                         static_cast<float>(x_max - origin_x));
-                                 const float gap_z = gap(z_of + one.z_min, z_of + one.z_max,
-                                                         static_cast<float>(z_min - origin_z),
-                                                         static_cast<float>(z_max - origin_z));
-                                 if (gap_x * gap_x + gap_z * gap_z < slack * slack) {
-                                     ReachShape& shape = near_.emplace_back(shape_of_reach(one));
-                                     shape.x = x_of;
-                                     shape.z = z_of;
-                                 }
-                             });
-    for (std::size_t t = 0; t < tile_count; ++t) {
-        Tile& tile = tiles[t];
+    rivers_.for_each_meeting(
+        {.first_i = rivers.cell_of(tiles.x_min, 1) - kRiverReachCells,
+         .last_i = rivers.cell_of(tiles.x_max, 0) + kRiverReachCells,
+         .first_j = rivers.row_of(tiles.z_min) - kRiverReachCells,
+         .last_j = rivers.row_of(tiles.z_max) + kRiverReachCells},
+        {.x_min = static_cast<float>(tiles.x_min - reference.x) - slack,
+         .x_max = static_cast<float>(tiles.x_max - reference.x) + slack,
+         .z_min = static_cast<float>(tiles.z_min - reference.z) - slack,
+         .z_max = static_cast<float>(tiles.z_max - reference.z) + slack},
+        [&](const Reach& one) {
+            const auto x_of = static_cast<float>(one.x - tiles.origin_x);
+            const auto z_of = static_cast<float>(one.z - tiles.origin_z);
+            const float gap_x = gap(x_of + one.x_min, x_of + one.x_max,
+                                    static_cast<float>(tiles.x_min - tiles.origin_x),
+                                    static_cast<float>(tiles.x_max - tiles.origin_x));
+            const float gap_z = gap(z_of + one.z_min, z_of + one.z_max,
+                                    static_cast<float>(tiles.z_min - tiles.origin_z),
+                                    static_cast<float>(tiles.z_max - tiles.origin_z));
+            if (gap_x * gap_x + gap_z * gap_z < slack * slack) {
+                ReachShape& shape = near_.emplace_back(shape_of_reach(one));
+                shape.x = x_of;
+                shape.z = z_of;
+            }
+        });
+}
+
+/// Near reaches are looked for once for all tiles.
+void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
+                               const LatticeTile& first, const RowKernels& kernels) {
+    const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
+    Tiles tiles = place_tiles(x, z, first);
+    find_near(constants, tiles);
+    const float reach = reach_of(constants);
+    for (std::size_t t = 0; t < tiles.count; ++t) {
+        Tiles::Tile& tile = tiles.tiles[t];
         kernels.landscape->valleys(tile.places, near_.data(),
                                    static_cast<std::int32_t>(near_.size()),
                                    {.inverse_reach_square = 1.0F / (reach * reach),
@@ -266,9 +294,9 @@ void ReliefBuilder::fill_tiles(const ReliefConstants& constants, const Axis& x, 
                                     .plateau = constants.plateau});
         for (std::size_t n = 0; n < kVectorPad; ++n) {
             float* const value = lattice_.data() + tile.at[n];
-            value[plane] = tile.places.weight[n] > 0
-                               ? tile.places.river[n]
-                               : rivers.potential_at(tile.moved_to[n].x, tile.moved_to[n].z);
+            value[plane] = tile.places.weight[n] > 0 ? tile.places.river[n]
+                                                     : constants.rivers.potential_at(
+                                                           tile.moved_to[n].x, tile.moved_to[n].z);
             value[2 * plane] = tile.places.crest[n];
         }
     }
@@ -304,76 +332,68 @@ void ReliefBuilder::fill_lattice(const ReliefConstants& constants, const Axis& x
     }
 }
 
-void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
-                          const RectangleShape& shape, const RowKernels& kernels,
-                          NoiseBuffers& buffers) {
-    const std::size_t size = shape.padded_size();
-    for (std::vector<float>* raster : {&out.ground, &out.river, &out.crest, &out.mountain,
-                                       &out.slope_x, &out.slope_z, &out.wander_x, &out.wander_z}) {
-        raster->resize(size);
+/// Half way between a river and a crest, without their shapes.
+void ReliefBuilder::build_far(ReliefRasters& out, const ReliefConstants& constants,
+                              const RectangleShape& shape, const RowKernels& kernels,
+                              NoiseBuffers& buffers) {
+    constexpr float kMeanCrest = 0.5F;
+    noise_rectangle(out.mountain.data(), constants.mountains, shape, kernels, buffers);
+    noise_rectangle(out.river.data(), constants.rivers.potential, shape, kernels, buffers);
+    for (std::size_t i = 0; i < shape.padded_size(); ++i) {
+        out.mountain[i] = mountain_of(out.mountain[i]);
+        out.river[i] = constants.rivers.ground + 1.6F * constants.rivers.fall * out.river[i];
+        out.crest[i] = kMeanCrest;
+        out.ground[i] = out.river[i] + constants.height * out.mountain[i] * kMeanCrest;
     }
-    if (shape.step > constants.rivers.cell_x) {
-        // Half way between a river and a crest, without their shapes.
-        constexpr float kMeanCrest = 0.5F;
-        noise_rectangle(out.mountain.data(), constants.mountains, shape, kernels, buffers);
-        noise_rectangle(out.river.data(), constants.rivers.potential, shape, kernels, buffers);
-        for (std::size_t i = 0; i < size; ++i) {
-            out.mountain[i] = mountain_of(out.mountain[i]);
-            out.river[i] = constants.rivers.ground + 1.6F * constants.rivers.fall * out.river[i];
-            out.crest[i] = kMeanCrest;
-            out.ground[i] = out.river[i] + constants.height * out.mountain[i] * kMeanCrest;
+}
+
+/// Lattice and columns are one, row by row of the same stride.
+void ReliefBuilder::take_points(ReliefRasters& out, std::size_t plane, std::size_t size) const {
+    const std::array<std::vector<float>*, kValues> to = {
+        &out.ground, &out.river, &out.crest, &out.mountain, &out.wander_x, &out.wander_z};
+    for (std::size_t v = 0; v < kValues; ++v) {
+        std::copy_n(lattice_.data() + v * plane, size, to[v]->begin());
+    }
+}
+
+/// Mixes the lattice along z for a row of columns: seven values a lattice column, g's slope along z
+/// too.
+void ReliefBuilder::mix_lattice_row(const Axis& x, const Axis& z, std::int32_t row) {
+    const std::size_t lines = x.stride();
+    const std::size_t plane = lines * z.lines.size() + kVectorPad;
+    const Taps along_z = taps_at(z.eighth[static_cast<std::size_t>(row)]);
+    const auto line_z = static_cast<std::size_t>(z.first[static_cast<std::size_t>(row)]);
+    for (std::size_t v = 0; v <= kValues; ++v) {
+        const float* const value = lattice_.data() + v % kValues * plane + line_z * lines;
+        const std::array<float, 4>& weight = v < kValues ? along_z.weight : along_z.slope;
+        float* const sum = mixed_.data() + v * lines;
+        if (z.points == 4) {
+            for (std::size_t line = 0; line < lines; ++line) {
+                sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
+                            weight[2] * value[2 * lines + line] +
+                            weight[3] * value[3 * lines + line];
+            }
+        } else {
+            for (std::size_t line = 0; line < lines; ++line) {
+                sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
+                            weight[2] * value[2 * lines + line];
+            }
         }
-        out.is_smooth = false;
-        std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
-        std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
-        return;
     }
-    out.is_smooth = shape.step <= constants.rivers.cell_x / kSmoothSteps;
-    const Axis x(shape.x0, shape.width, shape.step, out.is_smooth);
-    const Axis z(shape.z0, shape.length, shape.step, out.is_smooth);
-    fill_lattice(constants, x, z, kernels, buffers);
-    if (!out.is_smooth) {
-        // Lattice and columns are one, row by row of the same stride.
-        const std::size_t plane = x.stride() * z.lines.size() + kVectorPad;
-        const std::array<std::vector<float>*, kValues> to = {
-            &out.ground, &out.river, &out.crest, &out.mountain, &out.wander_x, &out.wander_z};
-        for (std::size_t v = 0; v < kValues; ++v) {
-            std::copy_n(lattice_.data() + v * plane, size, to[v]->begin());
-        }
-        std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
-        std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
-        return;
-    }
+}
+
+/// The B-spline, rows of the lattice first.
+void ReliefBuilder::smooth(ReliefRasters& out, const Axis& x, const Axis& z,
+                           const RectangleShape& shape, const RowKernels& kernels) {
     AllTaps taps;
     for (std::int64_t eighth = 0; eighth < kLatticeStep; ++eighth) {
         taps[static_cast<std::size_t>(eighth)] = taps_at(eighth);
     }
     const std::array<SplineShares, 2> shares = shares_of(taps);
-    // Rows of the lattice first, mixed along z: seven values a lattice column, g's slope along z
-    // too.
     const std::size_t lines = x.stride();
-    const std::size_t plane = lines * z.lines.size() + kVectorPad;
     mixed_.resize(std::max(mixed_.size(), lines * (kValues + 1)));
     for (std::int32_t row = 0; row < shape.length; ++row) {
-        const Taps& along_z = taps[z.eighth[static_cast<std::size_t>(row)]];
-        const auto line_z = static_cast<std::size_t>(z.first[static_cast<std::size_t>(row)]);
-        for (std::size_t v = 0; v <= kValues; ++v) {
-            const float* const value = lattice_.data() + v % kValues * plane + line_z * lines;
-            const std::array<float, 4>& weight = v < kValues ? along_z.weight : along_z.slope;
-            float* const sum = mixed_.data() + v * lines;
-            if (z.points == 4) {
-                for (std::size_t line = 0; line < lines; ++line) {
-                    sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
-                                weight[2] * value[2 * lines + line] +
-                                weight[3] * value[3 * lines + line];
-                }
-            } else {
-                for (std::size_t line = 0; line < lines; ++line) {
-                    sum[line] = weight[0] * value[line] + weight[1] * value[lines + line] +
-                                weight[2] * value[2 * lines + line];
-                }
-            }
-        }
+        mix_lattice_row(x, z, row);
         const auto first = static_cast<std::size_t>(row * shape.stride());
         const std::array<float*, kValues + 1> to = {
             out.ground.data() + first,   out.river.data() + first,    out.crest.data() + first,
@@ -405,6 +425,34 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
             }
             out.slope_x[first + static_cast<std::size_t>(column)] = sum[kValues + 1];
         }
+    }
+}
+
+void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
+                          const RectangleShape& shape, const RowKernels& kernels,
+                          NoiseBuffers& buffers) {
+    const std::size_t size = shape.padded_size();
+    for (std::vector<float>* raster : {&out.ground, &out.river, &out.crest, &out.mountain,
+                                       &out.slope_x, &out.slope_z, &out.wander_x, &out.wander_z}) {
+        raster->resize(size);
+    }
+    const bool is_far = shape.step > constants.rivers.cell_x;
+    out.is_smooth = !is_far && shape.step <= constants.rivers.cell_x / kSmoothSteps;
+    if (!out.is_smooth) {
+        std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
+        std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);
+    }
+    if (is_far) {
+        build_far(out, constants, shape, kernels, buffers);
+        return;
+    }
+    const Axis x(shape.x0, shape.width, shape.step, out.is_smooth);
+    const Axis z(shape.z0, shape.length, shape.step, out.is_smooth);
+    fill_lattice(constants, x, z, kernels, buffers);
+    if (out.is_smooth) {
+        smooth(out, x, z, shape, kernels);
+    } else {
+        take_points(out, x.stride() * z.lines.size() + kVectorPad, size);
     }
 }
 

@@ -66,6 +66,7 @@ class ReliefBuilder {
 
   private:
     struct Axis;
+    struct Tiles;
 
     /// Points of the lattice that are weighed together.
     struct LatticeTile {
@@ -79,6 +80,14 @@ class ReliefBuilder {
                       const RowKernels& kernels, NoiseBuffers& buffers);
     void fill_tiles(const ReliefConstants& constants, const Axis& x, const Axis& z,
                     const LatticeTile& first, const RowKernels& kernels);
+    Tiles place_tiles(const Axis& x, const Axis& z, const LatticeTile& first) const;
+    void find_near(const ReliefConstants& constants, const Tiles& tiles);
+    void build_far(ReliefRasters& out, const ReliefConstants& constants,
+                   const RectangleShape& shape, const RowKernels& kernels, NoiseBuffers& buffers);
+    void take_points(ReliefRasters& out, std::size_t plane, std::size_t size) const;
+    void smooth(ReliefRasters& out, const Axis& x, const Axis& z, const RectangleShape& shape,
+                const RowKernels& kernels);
+    void mix_lattice_row(const Axis& x, const Axis& z, std::int32_t row);
 
     RiverGraph rivers_;
     std::vector<float> lattice_;    ///< planes of g, hr, pf, vm and how a place is moved in x and z
