@@ -10,7 +10,6 @@ namespace terrane {
 namespace {
 
 constexpr float kBank = 1.5F;        ///< half widths: banks reach so far
-constexpr float kWet = 1.3F;         ///< half widths
 constexpr float kMeets = 3.0F;       ///< half widths: how far a river's level counts for others
 constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its river
 constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
@@ -75,18 +74,30 @@ Lookers lookers(float low, float high, float wander_min, float wander_max, std::
             .end = static_cast<std::int32_t>(std::clamp(end, 0.0F, most))};
 }
 
-/// Each column within `out` of each wet reach, reach by reach.
+float channel_height(const NearReach& near, float ground) {
+    const float d = near.distance;
+    const float w = near.half_width;
+    if (d < w) {
+        return near.level - 1.0F - std::min(0.8F + 0.5F * w, w) * (1.0F - d * d / (w * w));
+    }
+    return near.level - 1.0F +
+           (ground - near.level + 1.0F) * smooth_step(0, 1, (d - w) / (out_of(w) - w));
+}
+
+}  // namespace
+
 void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
                const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape,
-               const RowKernels& kernels) {
+               const RowKernels& kernels, float beyond) {
     found.clear();
     const Wander wander = wander_of(relief, shape);
     for (const Reach& reach : rivers.reaches()) {
         if (!is_wet(constants, reach)) {
             continue;
         }
-        const float out = out_of(
-            std::max(half_width_of(constants, reach, 0), half_width_of(constants, reach, 1)));
+        const float widest =
+            std::max(half_width_of(constants, reach, 0), half_width_of(constants, reach, 1));
+        const float out = std::max(out_of(widest), kWetWidths * widest + beyond);
         const auto x0 = static_cast<float>(reach.x - shape.x0);
         const auto z0 = static_cast<float>(reach.z - shape.z0);
         const Lookers columns = lookers(x0 + reach.x_min - out, x0 + reach.x_max + out,
@@ -118,7 +129,8 @@ void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
                     continue;
                 }
                 const float half_width = half_width_of(constants, reach, along[n]);
-                const float reach_out = out_of(half_width);
+                const float reach_out =
+                    std::max(out_of(half_width), kWetWidths * half_width + beyond);
                 if (half_width < kDryWidth || square[n] >= reach_out * reach_out) {
                     continue;
                 }
@@ -130,18 +142,6 @@ void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
         }
     }
 }
-
-float channel_height(const NearReach& near, float ground) {
-    const float d = near.distance;
-    const float w = near.half_width;
-    if (d < w) {
-        return near.level - 1.0F - std::min(0.8F + 0.5F * w, w) * (1.0F - d * d / (w * w));
-    }
-    return near.level - 1.0F +
-           (ground - near.level + 1.0F) * smooth_step(0, 1, (d - w) / (out_of(w) - w));
-}
-
-}  // namespace
 
 ChannelConstants::ChannelConstants(const WorldDefinition& definition)
     : rivers(static_cast<float>(definition.relief.rivers)) {
@@ -160,7 +160,7 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     out.weight.assign(size, 0);
     out.near.clear();
     if (relief.is_smooth && constants.rivers > 0) {
-        find_near(out.near, constants, relief, rivers, shape, kernels);
+        find_near(out.near, constants, relief, rivers, shape, kernels, 0);
         for (const NearReach& near : out.near) {
             const std::size_t i = near.column;
             const float nearness = near.distance / near.half_width;
@@ -191,7 +191,7 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     }
     std::int32_t wet = 0;
     for (std::size_t i = 0; i < size; ++i) {
-        const float river = out.nearness[i] < kWet ? out.water[i] / out.weight[i] : kNoWater;
+        const float river = out.nearness[i] < kWetWidths ? out.water[i] / out.weight[i] : kNoWater;
         const float water = std::max(river, constants.sea);
         wet |= static_cast<std::int32_t>(water > ground[i]);
         out.water[i] = water > ground[i] ? water : kNoWater;

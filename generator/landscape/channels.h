@@ -20,8 +20,9 @@
 
 namespace terrane {
 
-inline constexpr float kDryWidth = 0.4F;  ///< half the width, columns
-inline constexpr float kNoWater = -1e9F;  ///< stands for a water level where there is none
+inline constexpr float kDryWidth = 0.4F;   ///< half the width, columns
+inline constexpr float kWetWidths = 1.3F;  ///< half widths of a river: where its water ends
+inline constexpr float kNoWater = -1e9F;   ///< stands for a water level where there is none
 
 struct ChannelConstants {
     float rivers = 0;
@@ -48,6 +49,12 @@ struct ChannelRasters {
     std::vector<NearReach> near;    ///< scratch: reach by reach
     bool is_wet = false;            ///< water stands somewhere
 };
+
+/// Each column to which each reach that has water somewhere is near enough to shape its banks, or
+/// within `beyond` columns of its water; reach by reach.
+void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
+               const ReliefRasters& relief, const RiverGraph& rivers, const RectangleShape& shape,
+               const RowKernels& kernels, float beyond);
 
 /// Cuts the channels into `ground` and says where water stands; the sea is part of it.
 void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& constants,

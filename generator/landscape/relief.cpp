@@ -11,7 +11,6 @@
 namespace terrane {
 namespace {
 
-constexpr std::int64_t kSmoothSteps = 4;  ///< a valley is so many steps wide where it is smoothed
 constexpr std::size_t kTilesTogether = 2;
 constexpr std::size_t kValues = 6;  ///< of a lattice point: g, hr, pf, vm, and how it is moved
 
@@ -437,7 +436,7 @@ void ReliefBuilder::build(ReliefRasters& out, const ReliefConstants& constants,
         raster->resize(size);
     }
     const bool is_far = shape.step > constants.rivers.cell_x;
-    out.is_smooth = !is_far && shape.step <= constants.rivers.cell_x / kSmoothSteps;
+    out.is_smooth = !is_far && is_smooth_step(constants, shape.step);
     if (!out.is_smooth) {
         std::fill(out.slope_x.begin(), out.slope_x.end(), 0.0F);
         std::fill(out.slope_z.begin(), out.slope_z.end(), 0.0F);

@@ -53,6 +53,12 @@ struct ReliefRasters {
     bool is_smooth = false;  ///< false at coarse levels: there are no slopes, and no channels
 };
 
+/// Whether levels of such a step have slopes and channels.
+inline bool is_smooth_step(const ReliefConstants& constants, std::int64_t step) {
+    constexpr std::int64_t kSmoothSteps = 4;  // a valley is so many steps wide where it is smoothed
+    return step <= constants.rivers.cell_x / kSmoothSteps;
+}
+
 /// Builds relief for one worker; keeps its rivers and buffers.
 class ReliefBuilder {
   public:

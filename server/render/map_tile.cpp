@@ -1,5 +1,6 @@
 #include "server/render/map_tile.h"
 
+#include "generator/landscape/river_map.h"
 #include "generator/volume/color.h"
 #include "generator/volume/water.h"
 #include "protocol/base/mutex.h"
@@ -22,6 +23,8 @@ namespace {
 constexpr std::int32_t kBlockPixels = 256;
 /// Columns a side that are generated at once; the generator takes 126 at most.
 constexpr std::int32_t kPatchColumns = 124;
+/// Voxels of water in rivers that are drawn wider than they are.
+constexpr float kRiverDepth = 2;
 
 struct Patch {
     std::int32_t x = 0;
@@ -77,6 +80,33 @@ Seen seen_from_above(std::span<const Limit> column, const Palette& palette,
     return {.height = ground, .color = bed};
 }
 
+/// Rivers narrower than a pixel become as wide as one, or they would be dashes.
+void draw_rivers(Relief& relief, const Patch& patch, RiverMap& rivers, const ColumnPos& first,
+                 std::int64_t step, LinearColor water) {
+    const auto half_pixel = static_cast<float>(step << relief.detail) * 0.5F;
+    const RectangleShape shape{
+        .x0 = first.x, .z0 = first.z, .width = patch.width, .length = patch.length, .step = step};
+    const std::span<const float> distances = rivers.distances(shape, half_pixel);
+    for (std::int32_t z = 0; z < patch.length; ++z) {
+        for (std::int32_t x = 0; x < patch.width; ++x) {
+            if (distances[static_cast<std::size_t>(z * shape.stride() + x)] < half_pixel) {
+                LinearColor& color = relief.colors[relief.index_of(patch.x + x, patch.y + z)];
+                color = under_water(color, water, kRiverDepth);
+            }
+        }
+    }
+}
+
+/// What water looks like, if the world has some.
+std::optional<LinearColor> water_color(const World& world) {
+    for (const Material& material : world.definition.materials) {
+        if (material.kind == MaterialKind::water) {
+            return linear_from_srgb(material.color);
+        }
+    }
+    return std::nullopt;
+}
+
 void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
                 std::span<const Material> materials) {
     const std::vector<LinearColor> colors = palette_colors(set.palette, materials);
@@ -102,6 +132,8 @@ Result<void> sample(Relief& relief, const Drawing& drawing, ColumnPos first, std
     relief.heights.resize(count);
     relief.colors.resize(count);
     ColumnSet set;
+    RiverMap rivers(*drawing.world);
+    const std::optional<LinearColor> water = water_color(*drawing.world);
     for (std::int32_t y = 0; y < rows; y += kPatchColumns) {
         for (std::int32_t x = 0; x < columns; x += kPatchColumns) {
             if (auto on = go_on(drawing); !on) {
@@ -120,6 +152,11 @@ Result<void> sample(Relief& relief, const Drawing& drawing, ColumnPos first, std
                 return made;
             }
             fill_patch(relief, set, patch, drawing.world->definition.materials);
+            if (lod > 0 && water) {
+                draw_rivers(relief, patch, rivers,
+                            {.x = first.x - apron + x * step, .z = first.z - apron + y * step},
+                            step, *water);
+            }
         }
     }
     return {};
