@@ -354,8 +354,8 @@ void add_openapi_route(Router& router, std::int32_t tileset_levels) {
     router.add({.path = std::string(kOwnPath),
                 .handler = [response = http_ok("application/json",
                                                http_body(openapi_json(router, tileset_levels)))](
-                               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-                    respond(response);
+                               const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return response;
                 }});
 }
 

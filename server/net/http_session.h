@@ -104,14 +104,24 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     std::shared_ptr<ByteProtocol> take_successor() override;
 
   private:
-    struct Pending;
+    /// The request that is being answered.
+    struct Asked {
+        std::uint64_t id = 0;
+        bool keep_alive = true;
+        bool is_http_1_0 = false;
+        bool is_head = false;
+        Clock::time_point since;
+        std::string method;  ///< this and the path: for the log
+        std::string path;
+    };
 
     void process(Clock::time_point now);
-    void dispatch(ReceivedRequest received, Clock::time_point now);
+    void dispatch(ReceivedRequest& received, Clock::time_point now);
     void keep_to_rates_of(const HttpRequest& request);
     bool takes_request();
-    void answer(const Pending& pending, HttpResponse response);
-    void log_answer(const Pending& pending, unsigned status, std::size_t body_bytes) const;
+    HttpRespond later();
+    void answer(HttpResponse response);
+    void log_answer(unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);
     void close_with(std::string reason);
     bool upgrades(const ReceivedRequest& received);
@@ -123,7 +133,7 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     HttpReader reader_;
     Outbox outbox_;
     std::stop_source stop_;
-    std::shared_ptr<Pending> pending_;  ///< the request that has no answer yet
+    std::optional<Asked> asked_;  ///< the request that has no answer yet
     std::optional<ReceivedRequest> upgrade_;
     bool draining_ = false;
     bool input_ended_ = false;

@@ -19,6 +19,11 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
+/// With the loop's own executor: the usual one is looked up anew at each read.
+using Socket = asio::basic_stream_socket<tcp, asio::io_context::executor_type>;
+using Timer = asio::basic_waitable_timer<std::chrono::steady_clock,
+                                         asio::wait_traits<std::chrono::steady_clock>,
+                                         asio::io_context::executor_type>;
 using boost::system::error_code;
 using Clock = ByteProtocol::Clock;
 
@@ -39,7 +44,7 @@ class Connection;
 struct Loop {
     asio::io_context context{1};
     asio::executor_work_guard<asio::io_context::executor_type> guard{context.get_executor()};
-    asio::steady_timer timer{context};
+    Timer timer{context};
     std::unordered_set<std::shared_ptr<Connection>> connections;  // the loop's thread only
     bool draining = false;                                        // the loop's thread only
     Bytes plain;                                                  // scratch, the loop's thread only
@@ -69,7 +74,7 @@ struct Shared {
 /// A socket, its TLS if it has it, and its protocol. Everything on the loop's thread.
 class Connection : public std::enable_shared_from_this<Connection> {
   public:
-    Connection(Shared& shared, Loop& loop, const ListenPort& port, tcp::socket socket,
+    Connection(Shared& shared, Loop& loop, const ListenPort& port, Socket socket,
                std::string address)
         : shared_(shared),
           loop_(loop),
@@ -239,7 +244,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
             tls_->clear_output();
         }
         linger_until_ = Clock::now() + kLinger;
-        socket_.shutdown(tcp::socket::shutdown_send, ignored);
+        socket_.shutdown(Socket::shutdown_send, ignored);
     }
 
     void read() {
@@ -403,7 +408,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
     void wait_for_room() {
         writing_ = true;
-        socket_.async_wait(tcp::socket::wait_write, [self = shared_from_this()](error_code error) {
+        socket_.async_wait(Socket::wait_write, [self = shared_from_this()](error_code error) {
             self->writing_ = false;
             if (error) {
                 self->close();
@@ -416,7 +421,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     Shared& shared_;
     Loop& loop_;
     const ListenPort& port_;
-    tcp::socket socket_;
+    Socket socket_;
     const ConnectionOrigin origin_;
     const Clock::time_point connected_;
     std::unique_ptr<TlsChannel> tls_;
@@ -429,7 +434,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     bool reading_ = false;
     bool writing_ = false;
     std::optional<Clock::time_point> linger_until_;
-    std::optional<asio::steady_timer> wake_timer_;  ///< made when it is needed first
+    std::optional<Timer> wake_timer_;  ///< made when it is needed first
     std::optional<Clock::time_point> wakes_at_;
     std::string reason_;  ///< why we close, if the protocol doesn't know
 };
@@ -441,7 +446,7 @@ class Refusal : public std::enable_shared_from_this<Refusal> {
     /// Refusals that linger at a time, over all loops; the others go at once.
     static constexpr int kLingeringMax = 64;
 
-    Refusal(std::atomic<int>& lingering, const ListenPort& port, tcp::socket socket)
+    Refusal(std::atomic<int>& lingering, const ListenPort& port, Socket socket)
         : lingering_(lingering),
           port_(port),
           socket_(std::move(socket)),
@@ -460,7 +465,7 @@ class Refusal : public std::enable_shared_from_this<Refusal> {
         if (port_.tls == nullptr) {  // before a handshake nothing can be said
             socket_.write_some(asio::buffer(port_.refusal), error);
         }
-        socket_.shutdown(tcp::socket::shutdown_send, error);
+        socket_.shutdown(Socket::shutdown_send, error);
         if (error || lingering_ > kLingeringMax) {
             return;
         }
@@ -486,8 +491,8 @@ class Refusal : public std::enable_shared_from_this<Refusal> {
 
     std::atomic<int>& lingering_;
     const ListenPort& port_;
-    tcp::socket socket_;
-    asio::steady_timer timer_;
+    Socket socket_;
+    Timer timer_;
     std::array<std::byte, kReadBytes> read_buffer_{};
 };
 
@@ -499,7 +504,7 @@ struct Gate {
     ListenPort port;
     Endpoint bound;
     tcp::acceptor acceptor;
-    asio::steady_timer retry;
+    Timer retry;
 
     Result<void> bind() {
         error_code error;
@@ -594,7 +599,7 @@ struct Listener::Impl {
     void accept(Gate& gate) {
         Loop& loop = *loops[next_loop++ % loops.size()];
         gate.acceptor.async_accept(
-            loop.context, [this, &gate, &loop](error_code error, tcp::socket socket) {
+            loop.context, [this, &gate, &loop](error_code error, Socket socket) {
                 if (!gate.acceptor.is_open()) {
                     return;
                 }
@@ -621,7 +626,7 @@ struct Listener::Impl {
         });
     }
 
-    void admit(Gate& gate, Loop& loop, tcp::socket socket) {
+    void admit(Gate& gate, Loop& loop, Socket socket) {
         error_code error;
         const auto remote = socket.remote_endpoint(error);
         if (error) {

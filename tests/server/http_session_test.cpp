@@ -30,20 +30,19 @@ struct Fixture {
         router.add(
             {.path = "/now",
              .caching = HttpCaching::none,
-             .handler = [](const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-                 respond(http_ok("text/plain", http_body("now")));
+             .handler = [](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                 return http_ok("text/plain", http_body("now"));
              }});
         router.add(
             {.path = "/chunk",
              .caching = HttpCaching::none,
              .handler = [this](const HttpRequest& request, const RouteParams&,
-                               HttpRespond respond) {
-                 ask_service(
-                     *service, kKey, request,
-                     [respond = std::move(respond)](const Result<Answer>& answer) {
-                         respond(answer
-                                     ? http_ok("a/b", std::get<ServedChunk>(*answer).chunk->payload)
-                                     : http_problem(answer.error()));
+                               const HttpLater& later) {
+                 return ask_service(
+                     *service, kKey, request, later, [](const Result<Answer>& answer) {
+                         return answer
+                                    ? http_ok("a/b", std::get<ServedChunk>(*answer).chunk->payload)
+                                    : http_problem(answer.error());
                      });
              }});
         session = std::make_shared<HttpSession>(
