@@ -30,13 +30,11 @@ std::optional<HttpResponse> ask_service(ChunkService& service, const WorkKey& ke
     const auto question = std::make_shared<Question>();
     question->response_of = std::move(response_of);
     question->respond = later();
-    const auto outcome =
-        service.request(key, priority,
-                        {.id = id,
-                         .answer = [question](const Result<Answer>& result) {
-                             question->answer(result);
-                         },
-                         .flow = request.flow});
+    const auto outcome = service.request(
+        key, priority,
+        {.id = id,
+         .answer = [question](const Result<Answer>& result) { question->answer(result); },
+         .flow = request.flow});
     if (!outcome) {
         question->answer(tl::unexpected(outcome.error()));
     } else if (*outcome) {

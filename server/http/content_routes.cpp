@@ -67,16 +67,16 @@ std::optional<HttpResponse> answer_file(ChunkService& service, const WorkKey& ke
 /// A document that is made anew for each request: it takes microseconds.
 HttpHandler document(TilesetShape shape, std::string_view content_type,
                      Result<Bytes> (*make)(const TilesetShape&, const TileIndex&)) {
-    return
-        [shape, content_type, make](const HttpRequest&, const RouteParams& params, const HttpLater&) {
-            const auto tile = tile_of(shape, params);
-            if (!tile) {
-                return http_problem(tile.error());
-            }
-            auto bytes = make(shape, *tile);
-            return bytes ? http_ok(content_type, std::make_shared<const Bytes>(*std::move(bytes)))
-                         : http_problem(bytes.error());
-        };
+    return [shape, content_type, make](const HttpRequest&, const RouteParams& params,
+                                       const HttpLater&) {
+        const auto tile = tile_of(shape, params);
+        if (!tile) {
+            return http_problem(tile.error());
+        }
+        auto bytes = make(shape, *tile);
+        return bytes ? http_ok(content_type, std::make_shared<const Bytes>(*std::move(bytes)))
+                     : http_problem(bytes.error());
+    };
 }
 
 HttpHandler fixed(std::string_view content_type, std::string_view text) {

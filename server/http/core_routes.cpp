@@ -68,10 +68,9 @@ HttpHandler chunk_handler(const RouteContext& context, ChunkFormat format) {
         return ask_service(
             *context.service, ChunkKey{.position = *position, .format = format}, request, later,
             [&context, format](const Result<Answer>& answer) {
-                return answer
-                           ? chunk_response(*std::get<ServedChunk>(*answer).chunk,
-                                            content_type_of(format), *context.world)
-                           : http_problem(answer.error(), context.service->retry_after_ms());
+                return answer ? chunk_response(*std::get<ServedChunk>(*answer).chunk,
+                                               content_type_of(format), *context.world)
+                              : http_problem(answer.error(), context.service->retry_after_ms());
             });
     };
 }
@@ -209,22 +208,21 @@ void add_state_routes(Router& router, const RouteContext& context) {
                 .caching = HttpCaching::none,
                 .needs_token = false,
                 .handler = fixed("text/plain", "ok\n")});
-    router.add(
-        {.path = "/readyz",
-         .caching = HttpCaching::none,
-         .needs_token = false,
-         .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
-             return context.is_ready() ? http_ok("text/plain", http_body("ready\n"))
-                                       : http_problem({.code = ErrorCode::draining,
-                                                       .message = "the server is shutting down"});
-         }});
-    router.add(
-        {.path = "/metrics",
-         .caching = HttpCaching::none,
-         .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
-             return http_ok("text/plain; version=0.0.4; charset=utf-8",
-                            http_body(context.metrics()));
-         }});
+    router.add({.path = "/readyz",
+                .caching = HttpCaching::none,
+                .needs_token = false,
+                .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return context.is_ready()
+                               ? http_ok("text/plain", http_body("ready\n"))
+                               : http_problem({.code = ErrorCode::draining,
+                                               .message = "the server is shutting down"});
+                }});
+    router.add({.path = "/metrics",
+                .caching = HttpCaching::none,
+                .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return http_ok("text/plain; version=0.0.4; charset=utf-8",
+                                   http_body(context.metrics()));
+                }});
 }
 
 }  // namespace terrane

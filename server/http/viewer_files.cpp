@@ -108,9 +108,8 @@ Result<std::vector<ViewerFile>> read_viewer_files(const fs::path& folder) {
         if (!body) {
             return tl::unexpected(body.error());
         }
-        files.push_back({.path = path,
-                         .content_type = content_type_of(path),
-                         .body = *std::move(body)});
+        files.push_back(
+            {.path = path, .content_type = content_type_of(path), .body = *std::move(body)});
     }
     if (error) {
         return fail(ErrorCode::io_error, folder.string() + ": " + error.message());

@@ -193,10 +193,9 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     request_rate_.refill(now);
     if (!takes_request()) {
         const std::string most = std::to_string(rates_.requests_per_second_max);
-        answer(
-            http_problem({.code = ErrorCode::busy,
-                          .message = most + " requests a second are the most for this session"},
-                         1000 / rates_.requests_per_second_max + 1));
+        answer(http_problem({.code = ErrorCode::busy,
+                             .message = most + " requests a second are the most for this session"},
+                            1000 / rates_.requests_per_second_max + 1));
         return;
     }
     if (received.request.path == context_.websocket.path && context_.websocket.make) {
@@ -212,8 +211,7 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
         answer(std::move(refusal));
         return;
     }
-    if (auto response =
-            context_.router->handle(received.request, [this] { return later(); })) {
+    if (auto response = context_.router->handle(received.request, [this] { return later(); })) {
         answer(*std::move(response));
     }
 }

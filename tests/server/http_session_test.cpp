@@ -27,24 +27,23 @@ struct Fixture {
         gate.chunk.payload = http_body("payload");
         service.emplace(ServiceOptions{.cache_bytes_max = std::size_t{1} << 20U}, counters,
                         gate.maker());
-        router.add(
-            {.path = "/now",
-             .caching = HttpCaching::none,
-             .handler = [](const HttpRequest&, const RouteParams&, const HttpLater&) {
-                 return http_ok("text/plain", http_body("now"));
-             }});
-        router.add(
-            {.path = "/chunk",
-             .caching = HttpCaching::none,
-             .handler = [this](const HttpRequest& request, const RouteParams&,
-                               const HttpLater& later) {
-                 return ask_service(
-                     *service, kKey, request, later, [](const Result<Answer>& answer) {
-                         return answer
-                                    ? http_ok("a/b", std::get<ServedChunk>(*answer).chunk->payload)
-                                    : http_problem(answer.error());
-                     });
-             }});
+        router.add({.path = "/now",
+                    .caching = HttpCaching::none,
+                    .handler = [](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                        return http_ok("text/plain", http_body("now"));
+                    }});
+        router.add({.path = "/chunk",
+                    .caching = HttpCaching::none,
+                    .handler = [this](const HttpRequest& request, const RouteParams&,
+                                      const HttpLater& later) {
+                        return ask_service(
+                            *service, kKey, request, later, [](const Result<Answer>& answer) {
+                                return answer
+                                           ? http_ok("a/b",
+                                                     std::get<ServedChunk>(*answer).chunk->payload)
+                                           : http_problem(answer.error());
+                            });
+                    }});
         session = std::make_shared<HttpSession>(
             context, ConnectionOrigin{.id = 1, .address = "test"},
             [this](std::function<void()> step) {

@@ -169,8 +169,7 @@ TEST(Router, AsksTheGuardWhereATokenIsNeeded) {
 TEST(Router, AnswersOnceWhateverTheHandlerDoes) {
     Router router(kContent);
     using Handled = std::optional<HttpResponse>;
-    router.add({.path = "/throws",
-                .handler = [](const auto&, const auto&, const auto&) -> Handled {
+    router.add({.path = "/throws", .handler = [](const auto&, const auto&, const auto&) -> Handled {
                     throw std::runtime_error("broken");
                 }});
     router.add({.path = "/throws-late",
