@@ -1,5 +1,6 @@
 #include "server/http/core_routes.h"
 
+#include "generator/mesh/glb.h"
 #include "generator/world/world_file.h"
 #include "server/http/ask_service.h"
 #include "server/http/problem.h"
@@ -58,6 +59,18 @@ std::string_view content_type_of(ChunkFormat format) {
     return format == ChunkFormat::glb ? "model/gltf-binary" : "application/octet-stream";
 }
 
+/// Whether columns come with their flow plane: "flow=1", or nothing said. Meshes have none.
+Result<bool> with_flow(const HttpRequest& request, ChunkFormat format) {
+    if (format != ChunkFormat::columns || request.query.empty()) {
+        return true;
+    }
+    const std::string text = query_value(request.query, "flow").value_or("1");
+    if (text != "0" && text != "1") {
+        return fail(ErrorCode::invalid_argument, "flow: 0 (without) or 1 (with)");
+    }
+    return text == "1";
+}
+
 HttpHandler chunk_handler(const RouteContext& context, ChunkFormat format) {
     return [&context, format](const HttpRequest& request, const RouteParams& params,
                               const HttpLater& later) -> std::optional<HttpResponse> {
@@ -65,11 +78,16 @@ HttpHandler chunk_handler(const RouteContext& context, ChunkFormat format) {
         if (!position) {
             return http_problem(position.error());
         }
+        const auto flow = with_flow(request, format);
+        if (!flow) {
+            return http_problem(flow.error());
+        }
         return ask_service(
-            *context.service, ChunkKey{.position = *position, .format = format}, request, later,
-            [&context, format](const Result<Answer>& answer) {
-                return answer ? chunk_response(*std::get<ServedChunk>(*answer).chunk,
-                                               content_type_of(format), *context.world)
+            *context.service,
+            ChunkKey{.position = *position, .format = format, .without_flow = !*flow}, request,
+            later, [&context, format](const Result<Answer>& answer) {
+                return answer ? chunk_response(*std::get<ServedChunk>(*answer).chunk, format,
+                                               *context.world)
                               : http_problem(answer.error(), context.service->retry_after_ms());
             });
     };
@@ -114,10 +132,13 @@ HttpHandler fixed(std::string_view content_type, std::string_view text) {
 
 }  // namespace
 
-HttpResponse chunk_response(const EncodedChunk& chunk, std::string_view content_type,
-                            const World& world) {
-    HttpResponse response = http_ok(content_type, chunk.payload);
-    response.etag = chunk.etag;
+HttpResponse chunk_response(const EncodedChunk& chunk, ChunkFormat format, const World& world) {
+    HttpResponse response = http_ok(content_type_of(format), chunk.payload);
+    if (format == ChunkFormat::glb && !chunk.payload) {  // a loader is given a file in any case
+        response.body = std::make_shared<const Bytes>(empty_glb());
+    } else {
+        response.etag = chunk.etag;
+    }
     if (chunk.status == ChunkStatus::empty) {
         response.headers.emplace_back("Terrane-Status", "empty");
     } else if (chunk.status == ChunkStatus::uniform) {

@@ -28,6 +28,13 @@ constexpr std::string_view kPreflightHeaders =
     "Access-Control-Allow-Headers: Authorization, If-None-Match\r\n"
     "Access-Control-Max-Age: 86400\r\n";
 
+/// Says nothing, but a client that has gone answers it with a reset (RFC 9110, 15.2: a client reads
+/// over what it did not expect).
+Bytes probe_bytes() {
+    const auto text = bytes_of("HTTP/1.1 100 Continue\r\n\r\n");
+    return {text.begin(), text.end()};
+}
+
 std::string_view cache_header(HttpCaching caching) {
     switch (caching) {
         case HttpCaching::immutable:
@@ -146,8 +153,8 @@ void HttpSession::receive(std::span<const std::byte> bytes, Clock::time_point no
 
 void HttpSession::process(Clock::time_point now) {
     while (!asked_ && !upgrade_ && !closing_ && !dead_ && !outbox_.full()) {
-        if (draining_ && !reader_.is_inside_request()) {
-            close_with("the server is shutting down");
+        if ((draining_ || input_ended_) && !reader_.is_inside_request()) {
+            close_with(draining_ ? "the server is shutting down" : "");
             return;
         }
         byte_rate_.refill(now);
@@ -192,6 +199,7 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     keep_to_rates_of(received.request);
     request_rate_.refill(now);
     if (!takes_request()) {
+        context_.counters->limited.fetch_add(1, std::memory_order_relaxed);
         const std::string most = std::to_string(rates_.requests_per_second_max);
         answer(http_problem({.code = ErrorCode::busy,
                              .message = most + " requests a second are the most for this session"},
@@ -327,13 +335,13 @@ void HttpSession::close_with(std::string reason) {
 
 void HttpSession::input_ended() {
     input_ended_ = true;
-    if (asked_) {  // who has stopped sending has left
+    if (asked_ && asked_->is_http_1_0) {  // which knows no 1xx: there is no telling
         stop_.request_stop();
         dead_ = true;
-        return;
-    }
-    if (!closing_) {
-        close_with({});
+    } else if (asked_) {
+        outbox_.push(probe_bytes(), nullptr);
+    } else if (!wake_at_) {
+        process(Clock::now());
     }
 }
 

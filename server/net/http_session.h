@@ -5,6 +5,11 @@
 // A client above its requests a second gets 429; one above its bytes a second is read again when
 // they have come back.
 //
+// A client may say that it sends no more (a half-close): what it has sent is answered, then the
+// connection closes. That looks like a client that has gone, until something is sent to it: so one
+// that waits for an answer is told "100 Continue". Who has gone resets the connection, which ends
+// the session and takes the question back.
+//
 // The router makes the answers. One that it gives at once is written in the same step, by gather
 // write: the head is made here, the body is shared with the cache. One that comes later is posted
 // to the session's thread. Pipelined requests wait in the reader.
@@ -40,6 +45,7 @@ struct HttpCounters {
     std::atomic<std::uint64_t> requests{0};
     std::array<std::atomic<std::uint64_t>, 6> by_class{};  ///< answers; [4]: status 400 to 499
     std::atomic<std::uint64_t> not_modified{0};
+    std::atomic<std::uint64_t> limited{0};  ///< refused at the connection's rate of requests
 };
 
 /// Makes the protocol that follows an upgrade to WebSocket at `path`. `request` is the one that

@@ -291,9 +291,16 @@ class Connection : public std::enable_shared_from_this<Connection> {
             return;
         }
         protocol_->input_ended();
-        if (!protocol_->is_closing() && !protocol_->is_dead() && protocol_->wants_input()) {
-            close();  // it would read for ever
+        if (protocol_->is_closing() || protocol_->is_dead()) {
+            return;
         }
+        if (protocol_->wants_input()) {
+            close();  // it would read for ever
+            return;
+        }
+        // It has something to say yet. Nobody reads from now on, so a reset must be waited for.
+        socket_.async_wait(Socket::wait_error,
+                           [self = shared_from_this()](error_code) { self->close(); });
     }
 
     void received(std::span<const std::byte> bytes) {
