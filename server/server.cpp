@@ -133,7 +133,8 @@ constexpr std::array<std::pair<const char*, Counter OutcomeCounters::*>, 6> kOut
 
 constexpr const char* kNoRoom = "too many sessions are open";
 
-std::vector<MetricSample> request_samples(const ServiceCounters& counters) {
+std::vector<MetricSample> request_samples(const ServiceCounters& counters,
+                                          const HttpCounters& http) {
     std::vector<MetricSample> out;
     for (std::size_t i = 0; i < kRequestKinds.size(); ++i) {
         for (const auto& [outcome, member] : kOutcomes) {
@@ -145,6 +146,11 @@ std::vector<MetricSample> request_samples(const ServiceCounters& counters) {
                  .labels = "kind=" + std::string(kRequestKinds[i]) + ",outcome=" + outcome});
         }
     }
+    out.push_back({.name = "terrane_requests_total",
+                   .help = "Requests, by what was asked and outcome",
+                   .kind = MetricSample::Kind::counter,
+                   .value = static_cast<double>(count_of(counters.limited) + http.limited.load()),
+                   .labels = "kind=any,outcome=limited"});
     return out;
 }
 
@@ -333,7 +339,7 @@ struct Server::Impl {
 
 std::vector<MetricSample> Server::Impl::samples() {
     using Kind = MetricSample::Kind;
-    std::vector<MetricSample> out = request_samples(counters);
+    std::vector<MetricSample> out = request_samples(counters, http_counters);
     const auto add = [&out](Kind kind, const char* name, const char* help, auto value,
                             std::string labels = {}) {
         out.push_back({.name = name,

@@ -102,11 +102,9 @@ class Client::Session {
 };
 
 Result<void> Client::Session::greet(const ClientOptions& options, Deadline deadline) {
-    const ClientHello greeting{
-        .protocol_version = kProtocolVersion,
-        .client_name = options.client_name,
-        .token = options.token,
-        .formats = {ChunkFormat::draco, ChunkFormat::columns, ChunkFormat::draco_blocky}};
+    const ClientHello greeting{.protocol_version = kProtocolVersion,
+                               .client_name = options.client_name,
+                               .token = options.token};
     if (const auto sent = send(greeting); !sent) {
         return sent;
     }

@@ -33,7 +33,6 @@ inline constexpr std::size_t kWorldTextBytesMax = std::size_t{1} << 20U;
 inline constexpr double kWireVoxelSizeMinM = 0.001;
 inline constexpr double kWireVoxelSizeMaxM = 1000;
 inline constexpr std::int32_t kWireSideMax = 64;  ///< columns or voxels
-inline constexpr std::size_t kFormatsMax = 16;
 inline constexpr std::size_t kWireMaterialsMax = 256;
 inline constexpr std::size_t kWireSharesMax = 16;
 inline constexpr std::size_t kWireLimitsMax = 65536;  ///< limits of one column

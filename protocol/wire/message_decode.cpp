@@ -92,23 +92,9 @@ Result<AnyMessage> read(const wire::ClientHello& table) {
             *name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; })) {
         return bad(ErrorCode::malformed, "ClientHello.client_name: control characters");
     }
-    if (size_of(table.formats()) > kFormatsMax) {
-        return bad(ErrorCode::malformed,
-                   "ClientHello.formats: ", std::to_string(table.formats()->size()),
-                   " entries, at most ", std::to_string(kFormatsMax));
-    }
-    ClientHello hello{.protocol_version = table.protocol_version(),
-                      .client_name = std::move(*name),
-                      .token = std::move(*token),
-                      .formats = {}};
-    for (std::size_t i = 0; i < size_of(table.formats()); ++i) {
-        // A newer client may want formats that this build has never heard of.
-        if (const auto format =
-                format_of(table.formats()->Get(static_cast<flatbuffers::uoffset_t>(i)))) {
-            hello.formats.push_back(*format);
-        }
-    }
-    return hello;
+    return ClientHello{.protocol_version = table.protocol_version(),
+                       .client_name = std::move(*name),
+                       .token = std::move(*token)};
 }
 
 Result<WireMaterial> material_of(const wire::Material& table) {

@@ -95,14 +95,9 @@ template <typename T>
 using OffsetTarget = decltype(target_of(std::declval<T>()));
 
 Offset<wire::ClientHello> write(FlatBufferBuilder& builder, const ClientHello& hello) {
-    TERRANE_ASSERT(hello.formats.size() <= kFormatsMax);
     const auto name = text_of(builder, hello.client_name, kWireNameBytesMax);
     const auto token = text_of(builder, hello.token, kTokenBytesMax);
-    std::vector<wire::Format> formats;
-    std::ranges::transform(hello.formats, std::back_inserter(formats),
-                           [](ChunkFormat format) { return wire_of(format); });
-    return wire::CreateClientHello(builder, hello.protocol_version, name, token,
-                                   builder.CreateVector(formats));
+    return wire::CreateClientHello(builder, hello.protocol_version, name, token);
 }
 
 Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& hello) {

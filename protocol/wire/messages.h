@@ -78,7 +78,6 @@ struct ClientHello {
     std::uint32_t protocol_version = 0;
     std::string client_name;  ///< no control characters: it goes to logs
     std::string token;
-    std::vector<ChunkFormat> formats;  ///< formats this build doesn't know are left out when read
 
     friend bool operator==(const ClientHello&, const ClientHello&) = default;
 };

@@ -93,6 +93,11 @@ Result<std::optional<Answer>> ChunkService::request(const WorkKey& wish, std::in
     return refused;
 }
 
+std::optional<Answer> ChunkService::at_hand(const WorkKey& wish) {
+    const auto key = checked(wish);
+    return key && !draining_.load() ? cached(*key) : std::nullopt;
+}
+
 void ChunkService::cancel(const WorkKey& wish, WaiterId waiter) {
     const auto key = checked(wish);
     if (!key) {

@@ -59,6 +59,8 @@ class ChunkService {
     /// A higher priority is served sooner among those of one flow; from kNearPriority on, also
     /// before what is not near of all others.
     Result<std::optional<Answer>> request(const WorkKey& key, std::int32_t priority, Waiter waiter);
+    /// The answer if it is in the cache, for who would make a waiter only if it isn't.
+    std::optional<Answer> at_hand(const WorkKey& key);
     /// The waiter is not interested any more. An answer already on its way may still reach it.
     void cancel(const WorkKey& key, WaiterId waiter);
     /// The waiter's interest has become another: higher or lower. Counts for all that its flow

@@ -36,6 +36,7 @@ struct ServiceCounters {
     Counter joins{0};           ///< requests that joined one already in flight
     Counter answers{0};         ///< answers made by workers
     Counter undelivered{0};     ///< answers that could not be handed on for want of memory
+    Counter limited{0};         ///< native requests refused at a session's rate, unread
     Counter credit_stalls{0};   ///< times that a view began to wait for its client's credit
     std::array<OutcomeCounters, kRequestKinds.size()> outcomes;  ///< by kind
 };

@@ -11,26 +11,34 @@ namespace {
 
 /// A question without an answer yet. The service's table owns it, by way of the callback.
 struct Question {
-    ThenAnswer then;
+    ResponseOf response_of;
+    HttpRespond respond;
     std::optional<std::stop_callback<std::function<void()>>> on_stop;
+
+    void answer(const Result<Answer>& result) const { respond(response_of(result)); }
 };
 
 }  // namespace
 
-void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& request,
-                 ThenAnswer then, std::int32_t priority) {
+std::optional<HttpResponse> ask_service(ChunkService& service, const WorkKey& key,
+                                        const HttpRequest& request, const HttpLater& later,
+                                        ResponseOf response_of, std::int32_t priority) {
+    if (auto answer = service.at_hand(key)) {  // nearly always, and it takes no memory
+        return response_of(*std::move(answer));
+    }
     const WaiterId id = service.new_waiter_id();
     const auto question = std::make_shared<Question>();
-    question->then = std::move(then);
+    question->response_of = std::move(response_of);
+    question->respond = later();
     const auto outcome = service.request(
         key, priority,
         {.id = id,
-         .answer = [question](const Result<Answer>& result) { question->then(result); },
+         .answer = [question](const Result<Answer>& result) { question->answer(result); },
          .flow = request.flow});
     if (!outcome) {
-        question->then(tl::unexpected(outcome.error()));
+        question->answer(tl::unexpected(outcome.error()));
     } else if (*outcome) {
-        question->then(**outcome);
+        question->answer(**outcome);
     } else if (request.stop.stop_possible()) {
         const std::weak_ptr<Question> weak = question;
         question->on_stop.emplace(request.stop, [&service, key, id, weak] {
@@ -38,6 +46,7 @@ void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& r
             service.cancel(key, id);
         });
     }
+    return std::nullopt;
 }
 
 }  // namespace terrane

@@ -6,16 +6,19 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 namespace terrane {
 
-/// Told the answer once, on the caller's thread if it was in the cache, else on a worker's: hands
-/// it on. If the client goes first, the question is taken back and `then` may never be called.
-using ThenAnswer = std::function<void(const Result<Answer>&)>;
+/// Makes a response of the service's answer, on the caller's thread or on a worker's.
+using ResponseOf = std::function<HttpResponse(const Result<Answer>&)>;
 
-/// Asks for one piece of work on behalf of `request`; a higher priority is served sooner. `service`
-/// outlives all answers.
-void ask_service(ChunkService& service, const WorkKey& key, const HttpRequest& request,
-                 ThenAnswer then, std::int32_t priority = 0);
+/// Asks for one piece of work on behalf of `request`; a higher priority is served sooner. Returns
+/// the response if the answer is in the cache or a refusal, else it goes by way of `later`. If the
+/// client goes first, the question is taken back and may never be answered. `service` outlives all
+/// answers.
+std::optional<HttpResponse> ask_service(ChunkService& service, const WorkKey& key,
+                                        const HttpRequest& request, const HttpLater& later,
+                                        ResponseOf response_of, std::int32_t priority = 0);
 
 }  // namespace terrane

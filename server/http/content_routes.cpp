@@ -47,45 +47,41 @@ Result<TileIndex> tile_of(const TilesetShape& shape, const RouteParams& params) 
 }
 
 /// Asks for a file and answers with it, whenever it comes.
-void answer_file(ChunkService& service, const WorkKey& key, std::int32_t priority,
-                 std::string_view content_type, const HttpRequest& request, HttpRespond respond) {
-    ask_service(
-        service, key, request,
-        [&service, type = std::string(content_type),
-         respond = std::move(respond)](const Result<Answer>& answer) {
+std::optional<HttpResponse> answer_file(ChunkService& service, const WorkKey& key,
+                                        std::int32_t priority, std::string_view content_type,
+                                        const HttpRequest& request, const HttpLater& later) {
+    return ask_service(
+        service, key, request, later,
+        [&service, content_type](const Result<Answer>& answer) {
             if (!answer) {
-                respond(http_problem(answer.error(), service.retry_after_ms()));
-                return;
+                return http_problem(answer.error(), service.retry_after_ms());
             }
             const EncodedChunk& file = *std::get<ServedFile>(*answer).file;
-            HttpResponse response = http_ok(type, file.payload);
-            response.etag = to_hex(file.etag);
-            respond(std::move(response));
+            HttpResponse response = http_ok(content_type, file.payload);
+            response.etag = file.etag;
+            return response;
         },
         priority);
 }
 
 /// A document that is made anew for each request: it takes microseconds.
-HttpHandler document(TilesetShape shape, std::string content_type,
+HttpHandler document(TilesetShape shape, std::string_view content_type,
                      Result<Bytes> (*make)(const TilesetShape&, const TileIndex&)) {
-    return [shape, type = std::move(content_type), make](
-               const HttpRequest&, const RouteParams& params, const HttpRespond& respond) {
+    return [shape, content_type, make](const HttpRequest&, const RouteParams& params,
+                                       const HttpLater&) {
         const auto tile = tile_of(shape, params);
         if (!tile) {
-            respond(http_problem(tile.error()));
-            return;
+            return http_problem(tile.error());
         }
         auto bytes = make(shape, *tile);
-        respond(bytes ? http_ok(type, std::make_shared<const Bytes>(*std::move(bytes)))
-                      : http_problem(bytes.error()));
+        return bytes ? http_ok(content_type, std::make_shared<const Bytes>(*std::move(bytes)))
+                     : http_problem(bytes.error());
     };
 }
 
 HttpHandler fixed(std::string_view content_type, std::string_view text) {
-    return [response = http_ok(std::string(content_type), http_body(text))](
-               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-        respond(response);
-    };
+    return [response = http_ok(content_type, http_body(text))](
+               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
 }
 
 Result<Bytes> explicit_bytes(const TilesetShape& shape, const TileIndex& tile) {
@@ -95,16 +91,15 @@ Result<Bytes> explicit_bytes(const TilesetShape& shape, const TileIndex& tile) {
     });
 }
 
-void answer_map(const RouteContext& context, const HttpRequest& request, const RouteParams& params,
-                HttpRespond respond) {
+std::optional<HttpResponse> answer_map(const RouteContext& context, const HttpRequest& request,
+                                       const RouteParams& params, const HttpLater& later) {
     const auto numbers = three_of(params, {"zoom", "x", "y"});
     if (!numbers) {
-        respond(http_problem(numbers.error()));
-        return;
+        return http_problem(numbers.error());
     }
-    answer_file(*context.service,
-                MapTile{.zoom = (*numbers)[0], .x = (*numbers)[1], .y = (*numbers)[2]},
-                kPicturePriority, "image/png", request, std::move(respond));
+    return answer_file(*context.service,
+                       MapTile{.zoom = (*numbers)[0], .x = (*numbers)[1], .y = (*numbers)[2]},
+                       kPicturePriority, "image/png", request, later);
 }
 
 /// A number of a query; 0 if it is not there.
@@ -165,19 +160,16 @@ Result<void> check_size(const Section& section, const World& world) {
     return {};
 }
 
-void answer_section(const RouteContext& context, const HttpRequest& request,
-                    const RouteParams& params, HttpRespond respond) {
+std::optional<HttpResponse> answer_section(const RouteContext& context, const HttpRequest& request,
+                                           const RouteParams& params, const HttpLater& later) {
     const auto section = section_of(request, params);
     if (!section) {
-        respond(http_problem(section.error()));
-        return;
+        return http_problem(section.error());
     }
     if (const auto checked = check_size(*section, *context.world); !checked) {
-        respond(http_problem(checked.error()));
-        return;
+        return http_problem(checked.error());
     }
-    answer_file(*context.service, *section, kPicturePriority, "image/png", request,
-                std::move(respond));
+    return answer_file(*context.service, *section, kPicturePriority, "image/png", request, later);
 }
 
 }  // namespace
@@ -198,16 +190,15 @@ void add_tiles3d_routes(Router& router, const RouteContext& context) {
     router.add_versioned({.path = "/3dtiles/tileset-geo.json",
                           .handler = fixed(kJsonType, tileset_geo_json(shape))});
     router.add_versioned({.path = "/3dtiles/content/{level}/{x}/{y}.glb",
-                          .handler = [shape, service = context.service](const HttpRequest& request,
-                                                                        const RouteParams& params,
-                                                                        HttpRespond respond) {
+                          .handler = [shape, service = context.service](
+                                         const HttpRequest& request, const RouteParams& params,
+                                         const HttpLater& later) -> std::optional<HttpResponse> {
                               const auto tile = tile_of(shape, params);
                               if (!tile) {
-                                  respond(http_problem(tile.error()));
-                                  return;
+                                  return http_problem(tile.error());
                               }
-                              answer_file(*service, tile_key_of(shape, *tile), 0, kGlbType, request,
-                                          std::move(respond));
+                              return answer_file(*service, tile_key_of(shape, *tile), 0, kGlbType,
+                                                 request, later);
                           }});
     router.add_versioned({.path = "/3dtiles/subtrees/{level}/{x}/{y}.subtree",
                           .handler = document(shape, "application/octet-stream", subtree_of)});
@@ -217,19 +208,19 @@ void add_tiles3d_routes(Router& router, const RouteContext& context) {
     router.add_versioned({.path = "/3dtiles/explicit/tileset-geo.json",
                           .handler = fixed(kJsonType, explicit_tileset_geo_json(shape))});
     router.add_versioned({.path = "/3dtiles/explicit/{level}/{x}/{y}.json",
-                          .handler = document(shape, std::string(kJsonType), explicit_bytes)});
+                          .handler = document(shape, kJsonType, explicit_bytes)});
 }
 
 void add_picture_routes(Router& router, const RouteContext& context) {
     router.add_versioned({.path = "/map/{zoom}/{x}/{y}.png",
                           .handler = [&context](const HttpRequest& request,
-                                                const RouteParams& params, HttpRespond respond) {
-                              answer_map(context, request, params, std::move(respond));
+                                                const RouteParams& params, const HttpLater& later) {
+                              return answer_map(context, request, params, later);
                           }});
     router.add_versioned({.path = "/sections/{x0},{z0}/{x1},{z1}.png",
                           .handler = [&context](const HttpRequest& request,
-                                                const RouteParams& params, HttpRespond respond) {
-                              answer_section(context, request, params, std::move(respond));
+                                                const RouteParams& params, const HttpLater& later) {
+                              return answer_section(context, request, params, later);
                           }});
 }
 
@@ -237,21 +228,20 @@ void add_texture_routes(Router& router, const RouteContext& context) {
     router.add_versioned(
         {.path = "/textures/{name}",
          .handler = [world = context.world](const HttpRequest&, const RouteParams& params,
-                                            const HttpRespond& respond) {
+                                            const HttpLater&) {
              const auto& textures = world->definition.textures;
              const std::string_view name = params["name"];
              const auto found =
                  std::find_if(textures.begin(), textures.end(),
                               [name](const Texture& texture) { return texture.name == name; });
              if (found == textures.end()) {
-                 respond(http_problem({.code = ErrorCode::not_found,
-                                       .message = "this world has no texture \"" +
-                                                  std::string(name.substr(0, 64)) + "\""}));
-                 return;
+                 return http_problem({.code = ErrorCode::not_found,
+                                      .message = "this world has no texture \"" +
+                                                 std::string(name.substr(0, 64)) + "\""});
              }
              // The world outlives every answer: its bytes are shared, not copied.
-             respond(http_ok(std::string(content_type_of(found->name)),
-                             SharedBytes(SharedBytes(), &found->bytes)));
+             return http_ok(content_type_of(found->name),
+                            SharedBytes(SharedBytes(), &found->bytes));
          }});
 }
 

@@ -1,5 +1,6 @@
 #include "server/http/core_routes.h"
 
+#include "generator/mesh/glb.h"
 #include "generator/world/world_file.h"
 #include "server/http/ask_service.h"
 #include "server/http/problem.h"
@@ -54,24 +55,40 @@ Result<ChunkPos> position_of(const RouteParams& params) {
                     .z = static_cast<std::int32_t>(*z)};
 }
 
+std::string_view content_type_of(ChunkFormat format) {
+    return format == ChunkFormat::glb ? "model/gltf-binary" : "application/octet-stream";
+}
+
+/// Whether columns come with their flow plane: "flow=1", or nothing said. Meshes have none.
+Result<bool> with_flow(const HttpRequest& request, ChunkFormat format) {
+    if (format != ChunkFormat::columns || request.query.empty()) {
+        return true;
+    }
+    const std::string text = query_value(request.query, "flow").value_or("1");
+    if (text != "0" && text != "1") {
+        return fail(ErrorCode::invalid_argument, "flow: 0 (without) or 1 (with)");
+    }
+    return text == "1";
+}
+
 HttpHandler chunk_handler(const RouteContext& context, ChunkFormat format) {
-    const std::string_view type =
-        format == ChunkFormat::glb ? "model/gltf-binary" : "application/octet-stream";
-    return [service = context.service, world = context.world, format, type](
-               const HttpRequest& request, const RouteParams& params, HttpRespond respond) {
+    return [&context, format](const HttpRequest& request, const RouteParams& params,
+                              const HttpLater& later) -> std::optional<HttpResponse> {
         const auto position = position_of(params);
         if (!position) {
-            respond(http_problem(position.error()));
-            return;
+            return http_problem(position.error());
         }
-        ask_service(
-            *service, ChunkKey{.position = *position, .format = format}, request,
-            [service, world, type, respond = std::move(respond)](const Result<Answer>& answer) {
-                if (!answer) {
-                    respond(http_problem(answer.error(), service->retry_after_ms()));
-                    return;
-                }
-                respond(chunk_response(*std::get<ServedChunk>(*answer).chunk, type, *world));
+        const auto flow = with_flow(request, format);
+        if (!flow) {
+            return http_problem(flow.error());
+        }
+        return ask_service(
+            *context.service,
+            ChunkKey{.position = *position, .format = format, .without_flow = !*flow}, request,
+            later, [&context, format](const Result<Answer>& answer) {
+                return answer ? chunk_response(*std::get<ServedChunk>(*answer).chunk, format,
+                                               *context.world)
+                              : http_problem(answer.error(), context.service->retry_after_ms());
             });
     };
 }
@@ -90,41 +107,38 @@ std::string column_json(const ServedColumn& column, const World& world) {
     return json.dump();
 }
 
-void answer_column(const RouteContext& context, const HttpRequest& request,
-                   const RouteParams& params, HttpRespond respond) {
+std::optional<HttpResponse> answer_column(const RouteContext& context, const HttpRequest& request,
+                                          const RouteParams& params, const HttpLater& later) {
     const auto x = params.integer("x", -kColumnMax, kColumnMax);
     const auto z = params.integer("z", -kColumnMax, kColumnMax);
     if (!x || !z) {
-        respond(http_problem(x ? z.error() : x.error()));
-        return;
+        return http_problem(x ? z.error() : x.error());
     }
-    ask_service(
-        *context.service, ColumnPos{.x = *x, .z = *z}, request,
-        [service = context.service, world = context.world,
-         respond = std::move(respond)](const Result<Answer>& answer) {
-            if (!answer) {
-                respond(http_problem(answer.error(), service->retry_after_ms()));
-                return;
-            }
-            respond(http_ok("application/json",
-                            http_body(column_json(std::get<ServedColumn>(*answer), *world))));
+    return ask_service(
+        *context.service, ColumnPos{.x = *x, .z = *z}, request, later,
+        [&context](const Result<Answer>& answer) {
+            return answer ? http_ok("application/json",
+                                    http_body(column_json(std::get<ServedColumn>(*answer),
+                                                          *context.world)))
+                          : http_problem(answer.error(), context.service->retry_after_ms());
         });
 }
 
 /// The same bytes each time.
-HttpHandler fixed(std::string content_type, std::string_view text) {
-    return [type = std::move(content_type), body = http_body(text)](
-               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-        respond(http_ok(type, body));
-    };
+HttpHandler fixed(std::string_view content_type, std::string_view text) {
+    return [response = http_ok(content_type, http_body(text))](
+               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
 }
 
 }  // namespace
 
-HttpResponse chunk_response(const EncodedChunk& chunk, std::string_view content_type,
-                            const World& world) {
-    HttpResponse response = http_ok(std::string(content_type), chunk.payload);
-    response.etag = to_hex(chunk.etag);
+HttpResponse chunk_response(const EncodedChunk& chunk, ChunkFormat format, const World& world) {
+    HttpResponse response = http_ok(content_type_of(format), chunk.payload);
+    if (format == ChunkFormat::glb && !chunk.payload) {  // a loader is given a file in any case
+        response.body = std::make_shared<const Bytes>(empty_glb());
+    } else {
+        response.etag = chunk.etag;
+    }
     if (chunk.status == ChunkStatus::empty) {
         response.headers.emplace_back("Terrane-Status", "empty");
     } else if (chunk.status == ChunkStatus::uniform) {
@@ -205,8 +219,8 @@ void add_world_routes(Router& router, const RouteContext& context) {
     }
     router.add_versioned({.path = "/columns/{x}/{z}.json",
                           .handler = [&context](const HttpRequest& request,
-                                                const RouteParams& params, HttpRespond respond) {
-                              answer_column(context, request, params, std::move(respond));
+                                                const RouteParams& params, const HttpLater& later) {
+                              return answer_column(context, request, params, later);
                           }});
 }
 
@@ -215,22 +229,21 @@ void add_state_routes(Router& router, const RouteContext& context) {
                 .caching = HttpCaching::none,
                 .needs_token = false,
                 .handler = fixed("text/plain", "ok\n")});
-    router.add(
-        {.path = "/readyz",
-         .caching = HttpCaching::none,
-         .needs_token = false,
-         .handler = [&context](const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-             respond(context.is_ready() ? http_ok("text/plain", http_body("ready\n"))
-                                        : http_problem({.code = ErrorCode::draining,
-                                                        .message = "the server is shutting down"}));
-         }});
-    router.add(
-        {.path = "/metrics",
-         .caching = HttpCaching::none,
-         .handler = [&context](const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-             respond(
-                 http_ok("text/plain; version=0.0.4; charset=utf-8", http_body(context.metrics())));
-         }});
+    router.add({.path = "/readyz",
+                .caching = HttpCaching::none,
+                .needs_token = false,
+                .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return context.is_ready()
+                               ? http_ok("text/plain", http_body("ready\n"))
+                               : http_problem({.code = ErrorCode::draining,
+                                               .message = "the server is shutting down"});
+                }});
+    router.add({.path = "/metrics",
+                .caching = HttpCaching::none,
+                .handler = [&context](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return http_ok("text/plain; version=0.0.4; charset=utf-8",
+                                   http_body(context.metrics()));
+                }});
 }
 
 }  // namespace terrane

@@ -35,8 +35,8 @@ void add_state_routes(Router& router, const RouteContext& context);
 /// /v1/world's body.
 std::string world_json(const RouteContext& context, const std::string& versioned_prefix);
 
-/// A chunk as an answer: "Terrane-Status" says what an empty body means.
-HttpResponse chunk_response(const EncodedChunk& chunk, std::string_view content_type,
-                            const World& world);
+/// A chunk as an answer. Without a surface it is of length 0, as a GLB a file with an empty scene;
+/// "Terrane-Status" says what that means.
+HttpResponse chunk_response(const EncodedChunk& chunk, ChunkFormat format, const World& world);
 
 }  // namespace terrane

@@ -3,9 +3,12 @@
 #pragma once
 
 #include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
 
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -37,16 +40,20 @@ enum class HttpCaching : std::uint8_t {
 /// What a handler fills in. The router adds caching, CORS and the rest.
 struct HttpResponse {
     unsigned status = 200;
-    std::string content_type = {};
+    std::string_view content_type = {};  ///< a literal, or owned by what outlives the server
     std::vector<std::pair<std::string, std::string>> headers = {};
     SharedBytes body = {};
-    /// Without quotation marks. Empty: the router hashes the body, if the route may be cached.
-    std::string etag = {};
+    /// Written as 32 hex digits. None: the router hashes the body, if the route may be cached.
+    std::optional<Hash128> etag = {};
     HttpCaching caching = HttpCaching::none;  ///< the router's to set, from the route
 };
 
 /// Must be called once; from any thread, within the handler or later.
 using HttpRespond = std::function<void(HttpResponse)>;
+
+/// Makes the way by which an answer comes later. Called at most once, and only by who has none at
+/// hand: the answers that are cost nothing of it. Valid within the handler only.
+using HttpLater = std::function<HttpRespond()>;
 
 /// The text as a body.
 inline SharedBytes http_body(std::string_view text) {
@@ -54,9 +61,9 @@ inline SharedBytes http_body(std::string_view text) {
     return std::make_shared<const Bytes>(bytes.begin(), bytes.end());
 }
 
-inline HttpResponse http_ok(std::string content_type, SharedBytes body) {
+inline HttpResponse http_ok(std::string_view content_type, SharedBytes body) {
     HttpResponse response;
-    response.content_type = std::move(content_type);
+    response.content_type = content_type;
     response.body = std::move(body);
     return response;
 }

@@ -92,8 +92,9 @@ constexpr std::array kDescribed = {
               .asks_service = true},
     Described{.path = "/chunks/{lod}/{x}/{y}/{z}.columns",
               .tag = "chunks",
-              .summary = "A chunk's limits, in Terrane's own coding",
+              .summary = "A chunk's limits, in Terrane's own coding; with `flow=0` without flow",
               .content_type = "application/octet-stream",
+              .query = {"flow"},
               .asks_service = true},
     Described{.path = "/columns/{x}/{z}.json",
               .tag = "chunks",
@@ -187,6 +188,9 @@ Json schema_of(std::string_view name, const Described& route, const OpenApiConte
     if (name == "scale") {
         return integer(1, kSectionScaleMax, 2);
     }
+    if (name == "flow") {
+        return integer(0, 1, 1);
+    }
     if (route.tag == "chunks" && route.path.starts_with("/chunks/")) {
         return integer(kInt32Min, kInt32Max, 0);
     }
@@ -239,9 +243,11 @@ Json responses_of(const Described& route) {
         ok["headers"]["ETag"] = {{"schema", {{"type", "string"}}}};
     }
     if (route.path.starts_with("/chunks/")) {
-        ok["description"] = "The chunk; of length 0 if it is empty or uniform";
+        ok["description"] = route.path.ends_with(".glb")
+                                ? "The chunk; a file with an empty scene if it is empty or uniform"
+                                : "The chunk; of length 0 if it is empty or uniform";
         ok["headers"]["Terrane-Status"] = {
-            {"description", "`empty`, or `uniform; material=...`; absent if there is a body"},
+            {"description", "`empty`, or `uniform; material=...`; absent if there is a surface"},
             {"schema", {{"type", "string"}}}};
     }
     ok["content"][std::string(route.content_type)] = Json::object();
@@ -354,8 +360,8 @@ void add_openapi_route(Router& router, std::int32_t tileset_levels) {
     router.add({.path = std::string(kOwnPath),
                 .handler = [response = http_ok("application/json",
                                                http_body(openapi_json(router, tileset_levels)))](
-                               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-                    respond(response);
+                               const HttpRequest&, const RouteParams&, const HttpLater&) {
+                    return response;
                 }});
 }
 

@@ -42,7 +42,24 @@ std::pair<std::string_view, std::string_view> split_segment(std::string_view pat
     return {path.substr(0, end), path.substr(end)};
 }
 
-/// Makes sure that an answer is given once, even if the handler throws or forgets.
+/// What all answers of a route have in common.
+void complete(HttpResponse& response, HttpCaching caching, std::string_view if_none_match) {
+    if (response.status != 200 || caching == HttpCaching::none) {
+        return;
+    }
+    response.caching = caching;
+    if (!response.etag) {
+        response.etag =
+            hash128(response.body ? std::span(*response.body) : std::span<const std::byte>());
+    }
+    if (!if_none_match.empty() && etag_matches(if_none_match, to_hex(*response.etag))) {
+        response.status = 304;
+        response.body = nullptr;
+        response.content_type = {};
+    }
+}
+
+/// An answer that comes later. Makes sure that it is given once, even if the handler forgets.
 struct Reply {
     HttpRespond respond;
     HttpCaching caching = HttpCaching::none;
@@ -62,22 +79,10 @@ struct Reply {
     }
 
     void send(HttpResponse response) {
-        if (answered.exchange(true)) {
-            return;
+        if (!answered.exchange(true)) {
+            complete(response, caching, if_none_match);
+            respond(std::move(response));
         }
-        if (response.status == 200 && caching != HttpCaching::none) {
-            response.caching = caching;
-            if (response.etag.empty()) {
-                response.etag = to_hex(hash128(response.body ? std::span(*response.body)
-                                                             : std::span<const std::byte>()));
-            }
-            if (!if_none_match.empty() && etag_matches(if_none_match, response.etag)) {
-                response.status = 304;
-                response.body = nullptr;
-                response.content_type.clear();
-            }
-        }
-        respond(std::move(response));
     }
 };
 
@@ -232,13 +237,16 @@ bool Router::matches(const Entry& entry, const CutPath& path, RouteParams& param
         return false;
     }
     params.clear();
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = count; i-- > 0;) {  // endings differ most
         const Segment& segment = entry.segments[i];
         std::string_view text = path.segments[i];
         if (entry.takes_rest && i + 1 == count) {
             const auto before = static_cast<std::size_t>(text.data() - path.whole.data());
+            if (before >= path.whole.size()) {
+                return false;
+            }
             params.add(segment.front().text, path.whole.substr(before));
-            return before < path.whole.size();
+            continue;
         }
         for (std::size_t piece = 0; piece < segment.size(); ++piece) {
             if (!segment[piece].is_name) {
@@ -283,33 +291,33 @@ const Router::Entry* Router::find(std::string_view path, bool versioned,
     return nullptr;
 }
 
-void Router::handle(const HttpRequest& request, HttpRespond respond) const {
+std::optional<HttpResponse> Router::handle(const HttpRequest& request,
+                                           const HttpLater& later) const {
     try {
-        handle_path(request, respond);
+        return handle_path(request, later);
     } catch (const std::exception& error) {
-        respond(http_problem(500, std::string("the request failed: ") + error.what()));
+        return http_problem(500, std::string("the request failed: ") + error.what());
     }
 }
 
-void Router::handle_path(const HttpRequest& request, HttpRespond respond) const {
+std::optional<HttpResponse> Router::handle_path(const HttpRequest& request,
+                                                const HttpLater& later) const {
     const std::string_view path = request.path;
     RouteParams params;
     const Entry* entry = nullptr;
     if (!path.starts_with('/')) {
-        respond(request.method == "OPTIONS" && path == "*"
-                    ? HttpResponse{.status = 204, .headers = {{"Allow", std::string(kMethods)}}}
-                    : http_problem(400, "a path begins with '/'"));
-        return;
+        return request.method == "OPTIONS" && path == "*"
+                   ? HttpResponse{.status = 204, .headers = {{"Allow", std::string(kMethods)}}}
+                   : http_problem(400, "a path begins with '/'");
     }
     bool redirects = false;
     if (path.starts_with(kVersionedPrefix)) {
         const auto [world, behind] = split_segment(path.substr(kVersionedPrefix.size() - 1));
         if (world != content_id_) {
-            respond(http_problem({.code = ErrorCode::wrong_world,
-                                  .message = "content id " + in_quotes(world) +
-                                             ": this server's world is " + content_id_ +
-                                             "; /v1/world tells"}));
-            return;
+            return http_problem({.code = ErrorCode::wrong_world,
+                                 .message = "content id " + in_quotes(world) +
+                                            ": this server's world is " + content_id_ +
+                                            "; /v1/world tells"});
         }
         entry = behind.empty() ? nullptr : find(behind, true, params);
     } else {
@@ -320,19 +328,16 @@ void Router::handle_path(const HttpRequest& request, HttpRespond respond) const 
         }
     }
     if (entry == nullptr) {
-        respond(http_problem(404, "nothing is at " + in_quotes(path)));
-        return;
+        return http_problem(404, "nothing is at " + in_quotes(path));
     }
     if (request.method == "OPTIONS") {
-        respond({.status = 204, .headers = {{"Allow", std::string(kMethods)}}});
-        return;
+        return HttpResponse{.status = 204, .headers = {{"Allow", std::string(kMethods)}}};
     }
     if (request.method != "GET" && request.method != "HEAD") {
         HttpResponse refusal = http_problem(
             405, in_quotes(request.method) + " is not one of " + std::string(kMethods));
         refusal.headers.emplace_back("Allow", kMethods);
-        respond(std::move(refusal));
-        return;
+        return refusal;
     }
     if (redirects) {
         std::string location = versioned_prefix_;
@@ -341,23 +346,46 @@ void Router::handle_path(const HttpRequest& request, HttpRespond respond) const 
             location += '?';
             location += request.query;
         }
-        respond({.status = 307, .headers = {{"Location", std::move(location)}}});
-        return;
+        return HttpResponse{.status = 307, .headers = {{"Location", std::move(location)}}};
     }
     if (guard_ && entry->route.needs_token) {
         if (const auto allowed = guard_(request); !allowed) {
-            respond(http_problem(allowed.error()));
-            return;
+            return http_problem(allowed.error());
         }
     }
-    const auto reply =
-        std::make_shared<Reply>(std::move(respond), entry->route.caching, request.if_none_match);
+    return ask(*entry, request, params, later);
+}
+
+std::optional<HttpResponse> Router::ask(const Entry& entry, const HttpRequest& request,
+                                        const RouteParams& params, const HttpLater& later) {
+    struct Asked {
+        const Route& route;
+        const HttpRequest& request;
+        const HttpLater& later;
+        bool is_later = false;
+    } asked{.route = entry.route, .request = request, .later = later};
+
+    std::optional<HttpResponse> response;
     try {
-        entry->route.handler(request, params,
-                             [reply](HttpResponse response) { reply->send(std::move(response)); });
-    } catch (const std::exception& error) {
-        reply->send(http_problem(500, std::string("the request failed: ") + error.what()));
+        response = entry.route.handler(request, params, [&asked]() -> HttpRespond {
+            const auto reply = std::make_shared<Reply>(asked.later(), asked.route.caching,
+                                                       asked.request.if_none_match);
+            asked.is_later = true;
+            return [reply](HttpResponse answer) { reply->send(std::move(answer)); };
+        });
+    } catch (const std::exception&) {
+        if (!asked.is_later) {  // else the reply answers
+            throw;
+        }
     }
+    if (asked.is_later) {
+        return std::nullopt;
+    }
+    if (!response) {
+        return http_problem(500, "the answer was lost");
+    }
+    complete(*response, entry.route.caching, request.if_none_match);
+    return response;
 }
 
 std::vector<std::string> Router::paths() const {

@@ -5,6 +5,8 @@
 //     router.add({.path = "/v1/world", .caching = HttpCaching::revalidate, .handler = ...});
 //     router.add_versioned({.path = "/chunks/{lod}/{x}/{y}/{z}.drc", .handler = ...});
 //
+// An answer that is at hand is returned; only one that isn't takes a callback.
+//
 // A pattern is literal but for {name}, which stands for one or more characters of one segment; a
 // last segment {name...} stands for all the rest, slashes included. Between two names of a segment
 // stands a literal. The first route that fits is taken. A handler gets the values percent-decoded.
@@ -55,9 +57,10 @@ class RouteParams {
 };
 
 /// Called on an io thread: answers at once what is at hand, and hands on what takes more than about
-/// a millisecond. Must call `respond` once, whatever happens; may throw before that.
-using HttpHandler =
-    std::function<void(const HttpRequest& request, const RouteParams& params, HttpRespond respond)>;
+/// a millisecond. Returns the answer, or nothing if it has called `later` and will call what it got
+/// of it once, whatever happens; may throw.
+using HttpHandler = std::function<std::optional<HttpResponse>(
+    const HttpRequest& request, const RouteParams& params, const HttpLater& later)>;
 
 struct Route {
     std::string path;                               ///< the pattern
@@ -88,9 +91,9 @@ class Router {
     /// The path is what follows "/v1/w/W". "/v1" + path redirects there.
     void add_versioned(Route route);
 
-    /// Answers a request with whatever the table says. Never throws. `respond` may be called before
-    /// this returns.
-    void handle(const HttpRequest& request, HttpRespond respond) const;
+    /// The answer to a request, whatever the table says, or nothing: then `later` was called, and
+    /// what it gave will be called once, perhaps before this returns. Never throws but bad_alloc.
+    std::optional<HttpResponse> handle(const HttpRequest& request, const HttpLater& later) const;
 
     /// Every pattern as it stands in the table, versioned ones as "/v1/w/{W}/...": OpenAPI is held
     /// against this.
@@ -128,7 +131,10 @@ class Router {
     static CutPath cut(std::string_view path);
     static bool matches(const Entry& entry, const CutPath& path, RouteParams& params);
     const Entry* find(std::string_view path, bool versioned, RouteParams& params) const;
-    void handle_path(const HttpRequest& request, HttpRespond respond) const;
+    std::optional<HttpResponse> handle_path(const HttpRequest& request,
+                                            const HttpLater& later) const;
+    static std::optional<HttpResponse> ask(const Entry& entry, const HttpRequest& request,
+                                           const RouteParams& params, const HttpLater& later);
 
     const std::string content_id_;
     const std::string versioned_prefix_;

@@ -32,11 +32,9 @@ constexpr std::string_view kIndexPage = R"(<!doctype html>
 </html>
 )";
 
-HttpHandler file_handler(std::string content_type, SharedBytes body) {
-    return [type = std::move(content_type), body = std::move(body)](
-               const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-        respond(http_ok(type, body));
-    };
+HttpHandler file_handler(std::string_view content_type, SharedBytes body) {
+    return [response = http_ok(content_type, std::move(body))](
+               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
 }
 
 void add_file(Router& router, std::string path, const ViewerFile& file) {
@@ -110,9 +108,8 @@ Result<std::vector<ViewerFile>> read_viewer_files(const fs::path& folder) {
         if (!body) {
             return tl::unexpected(body.error());
         }
-        files.push_back({.path = path,
-                         .content_type = std::string(content_type_of(path)),
-                         .body = *std::move(body)});
+        files.push_back(
+            {.path = path, .content_type = content_type_of(path), .body = *std::move(body)});
     }
     if (error) {
         return fail(ErrorCode::io_error, folder.string() + ": " + error.message());
@@ -124,7 +121,7 @@ Result<std::vector<ViewerFile>> read_viewer_files(const fs::path& folder) {
 void add_viewer_routes(Router& router, std::vector<ViewerFile> files) {
     if (files.empty()) {
         files.push_back({.path = "/" + std::string(kIndexName),
-                         .content_type = std::string(content_type_of(kIndexName)),
+                         .content_type = content_type_of(kIndexName),
                          .body = http_body(kIndexPage)});
     }
     for (const ViewerFile& file : files) {

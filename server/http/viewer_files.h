@@ -17,7 +17,7 @@ inline constexpr std::size_t kViewerBytesMax = std::size_t{64} << 20U;
 
 struct ViewerFile {
     std::string path;  ///< "/assets/viewer.js"
-    std::string content_type;
+    std::string_view content_type;
     SharedBytes body;
 };
 

@@ -144,15 +144,16 @@ struct HttpReader::Impl {
     Bytes buffer;
     std::size_t used = 0;  ///< of the buffer
     std::optional<RequestParser> parser;
+    bool is_given = false;  ///< the parser's request has been given out whole
     std::optional<HttpFault> fault;
 
-    tl::expected<std::optional<ReceivedRequest>, HttpFault> refuse(HttpFault why) {
+    tl::expected<ReceivedRequest*, HttpFault> refuse(HttpFault why) {
         fault = std::move(why);
         return tl::unexpected(*fault);
     }
 
     /// The parser has all of a request.
-    tl::expected<std::optional<ReceivedRequest>, HttpFault> finish() {
+    tl::expected<ReceivedRequest*, HttpFault> finish() {
         ReceivedRequest& received = parser->received;
         received.keep_alive = parser->keep_alive();
         received.wants_websocket = received.wants_websocket && parser->upgrade();
@@ -165,21 +166,24 @@ struct HttpReader::Impl {
         if (parser->lengths > 1) {  // two lengths have let requests be smuggled in
             return refuse({.status = 400, .detail = "the body's length is given twice"});
         }
-        std::optional<ReceivedRequest> out(std::move(received));
-        parser.reset();
-        return out;
+        is_given = true;
+        return &received;
     }
 
-    tl::expected<std::optional<ReceivedRequest>, HttpFault> next() {
+    tl::expected<ReceivedRequest*, HttpFault> next() {
         if (fault) {
             return tl::unexpected(*fault);
+        }
+        if (is_given) {
+            parser.reset();
+            is_given = false;
         }
         while (true) {
             const auto rest = std::span(buffer).subspan(used);
             if (rest.empty()) {
                 buffer.clear();
                 used = 0;
-                return std::nullopt;
+                return nullptr;
             }
             if (!parser) {
                 // Empty lines before a request are passed over (RFC 9112, 2.2).
@@ -203,7 +207,7 @@ struct HttpReader::Impl {
                 }
                 buffer.erase(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(used));
                 used = 0;
-                return std::nullopt;
+                return nullptr;
             }
         }
     }
@@ -217,7 +221,7 @@ void HttpReader::feed(std::span<const std::byte> bytes) {
     impl_->buffer.insert(impl_->buffer.end(), bytes.begin(), bytes.end());
 }
 
-tl::expected<std::optional<ReceivedRequest>, HttpFault> HttpReader::next() {
+tl::expected<ReceivedRequest*, HttpFault> HttpReader::next() {
     return impl_->next();
 }
 
@@ -226,11 +230,11 @@ std::size_t HttpReader::buffered_bytes() const {
 }
 
 bool HttpReader::is_inside_request() const {
-    return impl_->parser.has_value() || buffered_bytes() > 0;
+    return (impl_->parser && !impl_->is_given) || buffered_bytes() > 0;
 }
 
 bool HttpReader::is_inside_body() const {
-    return impl_->parser && impl_->parser->is_header_done();
+    return impl_->parser && !impl_->is_given && impl_->parser->is_header_done();
 }
 
 Bytes HttpReader::take_rest() {

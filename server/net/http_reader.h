@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -43,8 +42,9 @@ class HttpReader {
     HttpReader& operator=(const HttpReader&) = delete;
 
     void feed(std::span<const std::byte> bytes);
-    /// The next request; nothing if it is not whole yet. After a fault every call gives it again.
-    tl::expected<std::optional<ReceivedRequest>, HttpFault> next();
+    /// The next request, valid until the next call; null if it is not whole yet. After a fault
+    /// every call gives it again.
+    tl::expected<ReceivedRequest*, HttpFault> next();
 
     /// Bytes of requests that were not given out yet.
     std::size_t buffered_bytes() const;

@@ -5,7 +5,6 @@
 #include "server/net/websocket_frames.h"
 
 #include <algorithm>
-#include <charconv>
 #include <ctime>
 #include <thread>
 #include <utility>
@@ -22,13 +21,19 @@ constexpr std::size_t kWaitingBytesMax = kHttpHeaderBytesMax;
 constexpr std::string_view kCommonHeaders =
     "Server: terrane\r\n"
     "Access-Control-Allow-Origin: *\r\n"
-    "Access-Control-Expose-Headers: ETag, Location, Retry-After, Terrane-Request, "
-    "Terrane-Status\r\n";
+    "Access-Control-Expose-Headers: *\r\n";
 /// What the answer to OPTIONS says besides.
 constexpr std::string_view kPreflightHeaders =
     "Access-Control-Allow-Methods: GET, HEAD, OPTIONS\r\n"
     "Access-Control-Allow-Headers: Authorization, If-None-Match\r\n"
     "Access-Control-Max-Age: 86400\r\n";
+
+/// Says nothing, but a client that has gone answers it with a reset (RFC 9110, 15.2: a client reads
+/// over what it did not expect).
+Bytes probe_bytes() {
+    const auto text = bytes_of("HTTP/1.1 100 Continue\r\n\r\n");
+    return {text.begin(), text.end()};
+}
 
 std::string_view cache_header(HttpCaching caching) {
     switch (caching) {
@@ -42,37 +47,44 @@ std::string_view cache_header(HttpCaching caching) {
     return {};
 }
 
-/// Appends text to bytes that have room.
+/// Appends text to bytes: a plain copy each, because a head is made for every request.
 class HeadWriter {
   public:
-    explicit HeadWriter(Bytes& out) : out_(out) {}
-
     HeadWriter& operator<<(std::string_view text) {
-        const auto bytes = bytes_of(text);
-        out_.insert(out_.end(), bytes.begin(), bytes.end());
+        const std::size_t end = size_ + text.size();
+        if (end > out_.size()) {
+            out_.resize(2 * end);
+        }
+        std::ranges::copy(bytes_of(text), out_.begin() + static_cast<std::ptrdiff_t>(size_));
+        size_ = end;
         return *this;
     }
 
     HeadWriter& operator<<(std::uint64_t number) {
         std::array<char, 20> digits{};
-        const auto [end, error] =
-            std::to_chars(digits.data(), digits.data() + digits.size(), number);
-        if (error == std::errc()) {
-            *this << std::string_view(digits.data(), end);
-        }
-        return *this;
+        std::size_t first = digits.size();
+        do {
+            digits[--first] = static_cast<char>('0' + number % 10);
+            number /= 10;
+        } while (number > 0);
+        return *this << std::string_view(digits.data() + first, digits.size() - first);
     }
 
     /// A header's value may have no line end in it.
-    void value(std::string_view text) {
-        for (const char c : text) {
-            const bool is_control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-            out_.push_back(static_cast<std::byte>(is_control ? '?' : c));
-        }
+    void value(std::string text) {
+        std::ranges::replace_if(
+            text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+        *this << text;
+    }
+
+    Bytes take() {
+        out_.resize(size_);
+        return std::move(out_);
     }
 
   private:
-    Bytes& out_;
+    Bytes out_ = Bytes(kHeadBytes);
+    std::size_t size_ = 0;
 };
 
 }  // namespace
@@ -93,15 +105,13 @@ std::string_view http_date(std::chrono::system_clock::time_point now) {
 
 Bytes http_head(const HttpResponse& response, std::uint64_t request_id, bool keep_alive,
                 std::string_view date) {
-    Bytes head;
-    head.reserve(kHeadBytes);
-    HeadWriter out(head);
+    HeadWriter out;
     out << "HTTP/1.1 " << std::uint64_t{response.status} << " " << reason_phrase(response.status)
         << "\r\nDate: " << date << "\r\n"
         << kCommonHeaders << cache_header(response.caching) << "Terrane-Request: " << request_id
         << "\r\n";
-    if (!response.etag.empty()) {
-        out << "ETag: \"" << response.etag << "\"\r\n";
+    if (response.etag) {
+        out << "ETag: \"" << to_hex(*response.etag) << "\"\r\n";
     }
     if (!response.content_type.empty()) {
         out << "Content-Type: " << response.content_type << "\r\n";
@@ -121,38 +131,8 @@ Bytes http_head(const HttpResponse& response, std::uint64_t request_id, bool kee
         out << "Connection: close\r\n";
     }
     out << "\r\n";
-    return head;
+    return out.take();
 }
-
-/// The request that is being answered. The answer may come from any thread.
-struct HttpSession::Pending {
-    std::weak_ptr<HttpSession> session;
-    ConnectionPost post;
-    std::thread::id thread;  ///< the session's
-    std::uint64_t id = 0;
-    std::string method;
-    std::string path;
-    bool keep_alive = true;
-    bool is_http_1_0 = false;
-    Clock::time_point since;
-    // The session's thread only:
-    bool in_handler = true;
-    std::optional<HttpResponse> at_once;
-
-    static void deliver(const std::shared_ptr<Pending>& self, HttpResponse response) {
-        if (std::this_thread::get_id() == self->thread && self->in_handler) {
-            self->at_once = std::move(response);
-            return;
-        }
-        self->post([self, response = std::move(response)]() mutable {
-            const auto session = self->session.lock();
-            if (session && session->pending_ == self) {
-                session->answer(*self, std::move(response));
-                session->process(Clock::now());
-            }
-        });
-    }
-};
 
 HttpSession::HttpSession(const HttpContext& context, ConnectionOrigin origin, ConnectionPost post,
                          Clock::time_point now)
@@ -172,9 +152,9 @@ void HttpSession::receive(std::span<const std::byte> bytes, Clock::time_point no
 }
 
 void HttpSession::process(Clock::time_point now) {
-    while (!pending_ && !upgrade_ && !closing_ && !dead_ && !outbox_.full()) {
-        if (draining_ && !reader_.is_inside_request()) {
-            close_with("the server is shutting down");
+    while (!asked_ && !upgrade_ && !closing_ && !dead_ && !outbox_.full()) {
+        if ((draining_ || input_ended_) && !reader_.is_inside_request()) {
+            close_with(draining_ ? "the server is shutting down" : "");
             return;
         }
         byte_rate_.refill(now);
@@ -195,59 +175,66 @@ void HttpSession::process(Clock::time_point now) {
         }
         had_request_ = true;
         request_since_ = now;
-        dispatch(**std::move(next), now);
+        dispatch(**next, now);
     }
 }
 
-void HttpSession::dispatch(ReceivedRequest received, Clock::time_point now) {
+void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     context_.counters->requests.fetch_add(1, std::memory_order_relaxed);
     received.request.id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
     received.request.session = origin_.id;
     received.request.flow = flow_;
     received.request.stop = stop_.get_token();
-    pending_ = std::make_shared<Pending>();
-    pending_->session = weak_from_this();
-    pending_->post = post_;
-    pending_->thread = std::this_thread::get_id();
-    pending_->id = received.request.id;
-    pending_->method = received.request.method;
-    pending_->keep_alive = received.keep_alive && !draining_;
-    pending_->is_http_1_0 = received.is_http_1_0;
-    pending_->since = now;
+    asked_ = {.id = received.request.id,
+              .keep_alive = received.keep_alive && !draining_,
+              .is_http_1_0 = received.is_http_1_0,
+              .is_head = received.request.method == "HEAD",
+              .since = now,
+              .method = {},
+              .path = {}};
     if (context_.requests_log != nullptr) {
-        pending_->path = received.request.path;
+        asked_->method = received.request.method;
+        asked_->path = received.request.path;
     }
-    const auto pending = pending_;
     keep_to_rates_of(received.request);
     request_rate_.refill(now);
     if (!takes_request()) {
+        context_.counters->limited.fetch_add(1, std::memory_order_relaxed);
         const std::string most = std::to_string(rates_.requests_per_second_max);
-        answer(*pending,
-               http_problem({.code = ErrorCode::busy,
+        answer(http_problem({.code = ErrorCode::busy,
                              .message = most + " requests a second are the most for this session"},
                             1000 / rates_.requests_per_second_max + 1));
         return;
     }
     if (received.request.path == context_.websocket.path && context_.websocket.make) {
         if (upgrades(received)) {
-            log_answer(*pending, 101, 0);
-            pending_.reset();
+            log_answer(101, 0);
+            asked_.reset();
             upgrade_ = std::move(received);
             return;
         }
         HttpResponse refusal =
             http_problem(426, "here the native messages are spoken over WebSocket, version 13");
         refusal.headers = {{"Upgrade", "websocket"}, {"Sec-WebSocket-Version", "13"}};
-        answer(*pending, std::move(refusal));
+        answer(std::move(refusal));
         return;
     }
-    context_.router->handle(received.request, [pending](HttpResponse response) {
-        Pending::deliver(pending, std::move(response));
-    });
-    pending->in_handler = false;
-    if (pending->at_once) {
-        answer(*pending, *std::exchange(pending->at_once, std::nullopt));
+    if (auto response = context_.router->handle(received.request, [this] { return later(); })) {
+        answer(*std::move(response));
     }
+}
+
+/// The way by which the answer to the present request comes from another thread, or later.
+HttpRespond HttpSession::later() {
+    return [weak = weak_from_this(), post = post_, id = asked_->id](HttpResponse response) {
+        post([weak, id, response = std::move(response)]() mutable {
+            const auto session = weak.lock();
+            if (session && session->asked_ && session->asked_->id == id) {
+                session->answer(std::move(response));
+                session->process(Clock::now());
+            }
+        });
+    };
 }
 
 void HttpSession::keep_to_rates_of(const HttpRequest& request) {
@@ -287,41 +274,40 @@ bool HttpSession::upgrades(const ReceivedRequest& received) {
            !draining_;
 }
 
-void HttpSession::answer(const Pending& pending, HttpResponse response) {
+void HttpSession::answer(HttpResponse response) {
     HttpCounters& counters = *context_.counters;
     counters.by_class.at(std::min(response.status / 100, 5U))
         .fetch_add(1, std::memory_order_relaxed);
     if (response.status == 304) {
         counters.not_modified.fetch_add(1, std::memory_order_relaxed);
     }
-    const bool keep_alive = pending.keep_alive && !input_ended_;
-    if (pending.is_http_1_0 && keep_alive) {
+    const bool keep_alive = asked_->keep_alive;
+    if (asked_->is_http_1_0 && keep_alive) {
         response.headers.emplace_back("Connection", "keep-alive");
     }
-    const bool has_body = pending.method != "HEAD" && response.status != 304;
+    const bool has_body = !asked_->is_head && response.status != 304;
     const std::size_t before_bytes = outbox_.bytes();
     outbox_.push(
-        http_head(response, pending.id, keep_alive, http_date(std::chrono::system_clock::now())),
+        http_head(response, asked_->id, keep_alive, http_date(std::chrono::system_clock::now())),
         has_body ? response.body : nullptr);
     byte_rate_.take(static_cast<double>(outbox_.bytes() - before_bytes));
-    log_answer(pending, response.status, response.body ? response.body->size() : 0);
-    pending_.reset();
+    log_answer(response.status, response.body ? response.body->size() : 0);
+    asked_.reset();
     if (!keep_alive) {
         close_with({});
     }
 }
 
-void HttpSession::log_answer(const Pending& pending, unsigned status,
-                             std::size_t body_bytes) const {
+void HttpSession::log_answer(unsigned status, std::size_t body_bytes) const {
     if (context_.requests_log == nullptr) {
         return;
     }
     const auto took =
-        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - pending.since);
-    context_.requests_log->debug("http", {{"request", pending.id},
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked_->since);
+    context_.requests_log->debug("http", {{"request", asked_->id},
                                           {"session", origin_.id},
-                                          {"method", pending.method},
-                                          {"path", pending.path},
+                                          {"method", asked_->method},
+                                          {"path", asked_->path},
                                           {"status", std::uint64_t{status}},
                                           {"bytes", std::uint64_t{body_bytes}},
                                           {"us", std::int64_t{took.count()}}});
@@ -349,13 +335,13 @@ void HttpSession::close_with(std::string reason) {
 
 void HttpSession::input_ended() {
     input_ended_ = true;
-    if (pending_) {  // who has stopped sending has left
+    if (asked_ && asked_->is_http_1_0) {  // which knows no 1xx: there is no telling
         stop_.request_stop();
         dead_ = true;
-        return;
-    }
-    if (!closing_) {
-        close_with({});
+    } else if (asked_) {
+        outbox_.push(probe_bytes(), nullptr);
+    } else if (!wake_at_) {
+        process(Clock::now());
     }
 }
 
@@ -386,7 +372,7 @@ void HttpSession::tick(Clock::time_point now) {
         dead_ = true;
         return;
     }
-    if (closing_ || pending_ || wake_at_ || !outbox_.empty()) {
+    if (closing_ || asked_ || wake_at_ || !outbox_.empty()) {
         return;
     }
     const HttpTimeouts& limits = context_.timeouts;
@@ -405,21 +391,21 @@ void HttpSession::tick(Clock::time_point now) {
 
 void HttpSession::drain() {
     draining_ = true;
-    if (pending_) {
-        pending_->keep_alive = false;
+    if (asked_) {
+        asked_->keep_alive = false;
     }
     process(Clock::now());
 }
 
 void HttpSession::end() {
     stop_.request_stop();
-    pending_.reset();
+    asked_.reset();
     dead_ = true;
 }
 
 bool HttpSession::wants_input() const {
     return !closing_ && !dead_ && !upgrade_ && !input_ended_ && !outbox_.full() &&
-           ((!pending_ && !wake_at_) || reader_.buffered_bytes() < kWaitingBytesMax);
+           ((!asked_ && !wake_at_) || reader_.buffered_bytes() < kWaitingBytesMax);
 }
 
 bool HttpSession::is_closing() const {

@@ -5,6 +5,11 @@
 // A client above its requests a second gets 429; one above its bytes a second is read again when
 // they have come back.
 //
+// A client may say that it sends no more (a half-close): what it has sent is answered, then the
+// connection closes. That looks like a client that has gone, until something is sent to it: so one
+// that waits for an answer is told "100 Continue". Who has gone resets the connection, which ends
+// the session and takes the question back.
+//
 // The router makes the answers. One that it gives at once is written in the same step, by gather
 // write: the head is made here, the body is shared with the cache. One that comes later is posted
 // to the session's thread. Pipelined requests wait in the reader.
@@ -40,6 +45,7 @@ struct HttpCounters {
     std::atomic<std::uint64_t> requests{0};
     std::array<std::atomic<std::uint64_t>, 6> by_class{};  ///< answers; [4]: status 400 to 499
     std::atomic<std::uint64_t> not_modified{0};
+    std::atomic<std::uint64_t> limited{0};  ///< refused at the connection's rate of requests
 };
 
 /// Makes the protocol that follows an upgrade to WebSocket at `path`. `request` is the one that
@@ -104,14 +110,24 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     std::shared_ptr<ByteProtocol> take_successor() override;
 
   private:
-    struct Pending;
+    /// The request that is being answered.
+    struct Asked {
+        std::uint64_t id = 0;
+        bool keep_alive = true;
+        bool is_http_1_0 = false;
+        bool is_head = false;
+        Clock::time_point since;
+        std::string method;  ///< this and the path: for the log
+        std::string path;
+    };
 
     void process(Clock::time_point now);
-    void dispatch(ReceivedRequest received, Clock::time_point now);
+    void dispatch(ReceivedRequest& received, Clock::time_point now);
     void keep_to_rates_of(const HttpRequest& request);
     bool takes_request();
-    void answer(const Pending& pending, HttpResponse response);
-    void log_answer(const Pending& pending, unsigned status, std::size_t body_bytes) const;
+    HttpRespond later();
+    void answer(HttpResponse response);
+    void log_answer(unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);
     void close_with(std::string reason);
     bool upgrades(const ReceivedRequest& received);
@@ -123,7 +139,7 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     HttpReader reader_;
     Outbox outbox_;
     std::stop_source stop_;
-    std::shared_ptr<Pending> pending_;  ///< the request that has no answer yet
+    std::optional<Asked> asked_;  ///< the request that has no answer yet
     std::optional<ReceivedRequest> upgrade_;
     bool draining_ = false;
     bool input_ended_ = false;

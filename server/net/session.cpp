@@ -152,6 +152,7 @@ bool Session::takes_request(std::uint32_t request_id, std::uint64_t number) {
         request_rate_.take(1);
         return true;
     }
+    raise(context_.service->counters().limited);
     const double wait_ms = 1000.0 / caps_.requests_per_second_max;
     send_failure(number, {.request_id = request_id,
                           .error = {.code = ErrorCode::busy,

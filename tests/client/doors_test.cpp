@@ -283,10 +283,8 @@ class TokenDoors : public Doors {
         if (!reply || reply->status != 101) {
             return "refused";
         }
-        const Bytes hello = encode_message(ClientHello{.protocol_version = kProtocolVersion,
-                                                       .client_name = "ws",
-                                                       .token = token,
-                                                       .formats = {}});
+        const Bytes hello = encode_message(
+            ClientHello{.protocol_version = kProtocolVersion, .client_name = "ws", .token = token});
         std::string frame = "\x82";
         frame += static_cast<char>(0x80U | hello.size());
         frame += std::string(4, '\0');

@@ -312,8 +312,7 @@ TEST_F(EndToEnd, BadInputIsAnsweredByAClearErrorAndTheServerGoesOn) {
     const auto server = start();
     ASSERT_TRUE(server);
     const std::uint16_t port = server->endpoint().port;
-    ClientHello hello{
-        .protocol_version = kProtocolVersion, .client_name = "bad", .token = {}, .formats = {}};
+    ClientHello hello{.protocol_version = kProtocolVersion, .client_name = "bad", .token = {}};
     Bytes wrong_identifier = encode_message(hello);
     wrong_identifier[12] = std::byte{'X'};
     hello.protocol_version = 99;

@@ -136,8 +136,8 @@ TEST_F(RequestLogTest, WebSocketRequestsHaveThemToo) {
     const auto carrier =
         make_carrier(CarrierKind::web_socket, {.host = "127.0.0.1", .port = port, .seed = 1});
     socket.send(text_of(carrier->opening()));
-    socket.send(text_of(carrier->wrap(ClientHello{
-        .protocol_version = kProtocolVersion, .client_name = "ws", .token = {}, .formats = {}})));
+    socket.send(text_of(carrier->wrap(
+        ClientHello{.protocol_version = kProtocolVersion, .client_name = "ws", .token = {}})));
     socket.send(text_of(carrier->wrap(ColumnQuery{.request_id = 7, .column = {.x = 0, .z = 0}})));
     bool is_answered = false;
     while (!is_answered) {

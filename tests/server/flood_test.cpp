@@ -179,10 +179,8 @@ TEST_F(Flood, ConnectionsAboveTheCapAreToldAndTheOthersServed) {
     bool is_in = false;
     for (int attempt = 0; attempt < 1000 && !is_in; ++attempt) {
         RawClient again(serve_->port());
-        again.send(ClientHello{.protocol_version = kProtocolVersion,
-                               .client_name = "again",
-                               .token = {},
-                               .formats = {}});
+        again.send(
+            ClientHello{.protocol_version = kProtocolVersion, .client_name = "again", .token = {}});
         const auto answer = again.next();
         is_in = answer && std::holds_alternative<ServerHello>(answer->message);
     }

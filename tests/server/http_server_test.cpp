@@ -1,5 +1,6 @@
 // The HTTP port of a whole server, talked to in bytes.
 #include "generator/mesh/draco_codec.h"
+#include "generator/mesh/glb.h"
 #include "generator/world/world_file.h"
 #include "server/chunks/build_chunk.h"
 #include "server/server.h"
@@ -116,6 +117,99 @@ TEST(HttpServer, AnswersPipelinedRequestsInOrder) {
         const auto reply = client.reply();
         ASSERT_TRUE(reply) << i;
         EXPECT_EQ(nlohmann::json::parse(reply->body)["x"], i);
+    }
+}
+
+TEST(HttpServer, AnswersWhatCameBeforeAHalfCloseThenCloses) {
+    const Running r;
+    for (int i = 0; i < 20; ++i) {
+        HttpClient client(r.port());
+        std::string requests;
+        for (int request = 0; request < 3; ++request) {
+            requests += "GET " + r.prefix + "/columns/" + std::to_string(i * 100 + request) +
+                        "/0.json HTTP/1.1\r\nHost: a\r\n\r\n";
+        }
+        client.send(requests);
+        client.end_sending();
+        for (int request = 0; request < 3; ++request) {
+            auto reply = client.reply();
+            while (reply && reply->status == 100) {
+                reply = client.reply();
+            }
+            ASSERT_TRUE(reply) << i;
+            EXPECT_EQ(reply->status, 200U);
+            EXPECT_EQ(nlohmann::json::parse(reply->body)["x"], i * 100 + request);
+        }
+        EXPECT_TRUE(client.is_closed());
+    }
+}
+
+TEST(HttpServer, WhoClosesTakesTheQuestionBack) {
+    const Running r;
+    const auto section = [&r](int z) {
+        return "GET " + r.prefix + "/sections/0," + std::to_string(z) + "/4000," +
+               std::to_string(z) + ".png HTTP/1.1\r\nHost: a\r\n\r\n";
+    };
+    std::vector<std::unique_ptr<HttpClient>> others;  // keep both workers busy for a while
+    for (int i = 0; i < 8; ++i) {
+        others.push_back(std::make_unique<HttpClient>(r.port()));
+        others.back()->send(section(i));
+    }
+    HttpClient watching(r.port());
+    const auto sees = [&watching](std::string_view line) {
+        const auto reply = watching.get("/metrics");
+        return reply && reply->body.find(line) != std::string::npos;
+    };
+    {
+        HttpClient(r.port()).send(section(99));
+    }
+    while (!sees("terrane_requests_total{kind=\"section\",outcome=\"cancelled\"} 1\n")) {
+        ASSERT_FALSE(sees("terrane_requests_total{kind=\"section\",outcome=\"generated\"} 9\n"));
+        std::this_thread::yield();
+    }
+}
+
+TEST(HttpServer, GivesColumnsWithoutFlow) {
+    const Running r;
+    RawClient native(r.server->endpoint().port);
+    ASSERT_TRUE(native.hello());
+    HttpClient client(r.port());
+    const std::string path = r.prefix + "/chunks/0/0/0/0.columns";
+    for (const bool without : {false, true}) {
+        ChunkRequest request;
+        request.request_id = 1;
+        request.format = ChunkFormat::columns;
+        request.without_flow = without;
+        request.keys = {{.lod = 0, .x = 0, .y = 0, .z = 0}};
+        native.send(request);
+        const auto expected = native.next();
+        ASSERT_TRUE(expected);
+        const auto reply = client.get(path + (without ? "?flow=0" : "?flow=1"));
+        ASSERT_TRUE(reply);
+        EXPECT_EQ(reply->status, 200U);
+        EXPECT_EQ(reply->body, text_of(expected->payload));
+        EXPECT_EQ(reply->header("cache-control"), "public, max-age=31536000, immutable");
+        EXPECT_EQ(reply->header("etag"),
+                  "\"" + to_hex(std::get<ChunkAnswer>(expected->message).etag) + "\"");
+        EXPECT_EQ(client.get(path)->header("etag") == reply->header("etag"), !without);
+    }
+    EXPECT_EQ(client.get(path + "?flow=no")->status, 400U);
+    EXPECT_EQ(client.get("/v1/chunks/0/0/0/0.columns?flow=0")->header("location"),
+              path + "?flow=0");
+}
+
+TEST(HttpServer, AGlbIsAFileWithoutASurfaceToo) {
+    const Running r;
+    HttpClient client(r.port());
+    const std::string empty(text_of(empty_glb()));
+    for (const int y : {-1, 99}) {
+        const auto reply = client.get(r.prefix + "/chunks/0/0/" + std::to_string(y) + "/0.glb");
+        ASSERT_TRUE(reply);
+        EXPECT_EQ(reply->status, 200U);
+        EXPECT_EQ(reply->header("content-type"), "model/gltf-binary");
+        EXPECT_EQ(reply->body, empty);
+        EXPECT_EQ(reply->header("etag"), "\"" + to_hex(hash128(bytes_of(empty))) + "\"");
+        EXPECT_NE(reply->header("terrane-status"), "");
     }
 }
 

@@ -27,25 +27,23 @@ struct Fixture {
         gate.chunk.payload = http_body("payload");
         service.emplace(ServiceOptions{.cache_bytes_max = std::size_t{1} << 20U}, counters,
                         gate.maker());
-        router.add(
-            {.path = "/now",
-             .caching = HttpCaching::none,
-             .handler = [](const HttpRequest&, const RouteParams&, const HttpRespond& respond) {
-                 respond(http_ok("text/plain", http_body("now")));
-             }});
-        router.add(
-            {.path = "/chunk",
-             .caching = HttpCaching::none,
-             .handler = [this](const HttpRequest& request, const RouteParams&,
-                               HttpRespond respond) {
-                 ask_service(
-                     *service, kKey, request,
-                     [respond = std::move(respond)](const Result<Answer>& answer) {
-                         respond(answer
-                                     ? http_ok("a/b", std::get<ServedChunk>(*answer).chunk->payload)
-                                     : http_problem(answer.error()));
-                     });
-             }});
+        router.add({.path = "/now",
+                    .caching = HttpCaching::none,
+                    .handler = [](const HttpRequest&, const RouteParams&, const HttpLater&) {
+                        return http_ok("text/plain", http_body("now"));
+                    }});
+        router.add({.path = "/chunk",
+                    .caching = HttpCaching::none,
+                    .handler = [this](const HttpRequest& request, const RouteParams&,
+                                      const HttpLater& later) {
+                        return ask_service(
+                            *service, kKey, request, later, [](const Result<Answer>& answer) {
+                                return answer
+                                           ? http_ok("a/b",
+                                                     std::get<ServedChunk>(*answer).chunk->payload)
+                                           : http_problem(answer.error());
+                            });
+                    }});
         session = std::make_shared<HttpSession>(
             context, ConnectionOrigin{.id = 1, .address = "test"},
             [this](std::function<void()> step) {
@@ -130,6 +128,7 @@ TEST(HttpSession, WhoAsksTooOftenGets429UntilTimeHasPassed) {
     EXPECT_THAT(out, HasSubstr("429 Too Many Requests"));
     EXPECT_THAT(out, HasSubstr("Retry-After: 1\r\n"));
     EXPECT_THAT(out, HasSubstr("2 requests a second are the most"));
+    EXPECT_EQ(f.http_counters.limited, 1U);
     EXPECT_LT(out.find("200 OK"), out.find("429"));
     f.pass(600ms);
     f.send(kNow);
@@ -190,7 +189,7 @@ TEST(HttpSession, AnswersLaterOnItsOwnThreadAndTheNextOneAfterwards) {
 TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
     for (const bool closes : {false, true}) {
         Fixture f;
-        f.send(kChunk);
+        f.send(closes ? kChunk : "GET /chunk HTTP/1.0\r\n\r\n");
         f.gate.begun.acquire();
         EXPECT_EQ(f.service->in_flight(), 1U);
         if (closes) {
@@ -203,6 +202,42 @@ TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
         EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
         f.gate.passes.release();
     }
+}
+
+TEST(HttpSession, AnswersAllThatCameBeforeAHalfClose) {
+    Fixture f;
+    f.send(std::string(kNow) + std::string(kChunk) + std::string(kNow) + "GET /cut");
+    f.gate.begun.acquire();
+    f.session->input_ended();
+    EXPECT_FALSE(f.session->wants_input());
+    EXPECT_FALSE(f.session->is_closing() || f.session->is_dead());
+    std::string out = f.output();
+    EXPECT_TRUE(out.ends_with("\r\n\r\nnowHTTP/1.1 100 Continue\r\n\r\n")) << out;
+    f.gate.passes.release();
+    f.run_posted();
+    out = f.output();
+    EXPECT_LT(out.find("\r\n\r\npayload"), out.find("\r\n\r\nnow"));
+    EXPECT_TRUE(out.ends_with("now"));
+    EXPECT_TRUE(f.session->is_closing());
+
+    Fixture idle;
+    idle.send(kNow);
+    idle.session->input_ended();
+    EXPECT_TRUE(idle.session->is_closing());
+}
+
+TEST(HttpSession, AHalfCloseWaitsForTheByteRateToo) {
+    Fixture f;
+    f.context.rates_of = [](std::string_view) {
+        return HttpRates{.requests_per_second_max = 0, .bytes_per_second_max = 100};
+    };
+    f.send(std::string(kNow) + std::string(kNow));
+    EXPECT_THAT(f.output(), HasSubstr("200 OK"));
+    f.session->input_ended();
+    EXPECT_FALSE(f.session->is_closing());
+    f.pass(1h);
+    EXPECT_THAT(f.output(), HasSubstr("200 OK"));
+    EXPECT_TRUE(f.session->is_closing());
 }
 
 TEST(HttpSession, WhoWaitsForItsAnswerMayBeSilentForLong) {

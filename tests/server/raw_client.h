@@ -131,10 +131,7 @@ class RawClient {
     }
 
     std::optional<ServerHello> hello() {
-        send(ClientHello{.protocol_version = kProtocolVersion,
-                         .client_name = "raw",
-                         .token = {},
-                         .formats = {}});
+        send(ClientHello{.protocol_version = kProtocolVersion, .client_name = "raw", .token = {}});
         return next_as<ServerHello>();
     }
 

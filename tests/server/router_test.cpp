@@ -26,7 +26,12 @@ HttpRequest get(std::string path) {
 
 HttpResponse asked(const Router& router, const HttpRequest& request) {
     std::vector<HttpResponse> answers;
-    router.handle(request, [&](HttpResponse response) { answers.push_back(std::move(response)); });
+    auto at_once = router.handle(request, [&] {
+        return [&](HttpResponse response) { answers.push_back(std::move(response)); };
+    });
+    if (at_once) {
+        answers.push_back(*std::move(at_once));
+    }
     EXPECT_EQ(answers.size(), 1U);
     return answers.empty() ? HttpResponse{} : answers.front();
 }
@@ -47,12 +52,12 @@ std::string header(const HttpResponse& response, std::string_view name) {
 /// Answers with the values of the names, joined.
 HttpHandler echo(std::vector<std::string> names) {
     return [names = std::move(names)](const HttpRequest&, const RouteParams& params,
-                                      const HttpRespond& respond) {
+                                      const HttpLater&) {
         std::string text;
         for (const std::string& name : names) {
             text += std::string(params[name]) + ";";
         }
-        respond(http_ok("text/plain", http_body(text)));
+        return http_ok("text/plain", http_body(text));
     };
 }
 
@@ -123,13 +128,13 @@ TEST(Router, GivesTagsAndSaysNotModified) {
     HttpRequest request = get("/v1/world");
     const HttpResponse first = asked(router, request);
     EXPECT_EQ(first.caching, HttpCaching::revalidate);
-    ASSERT_EQ(first.etag.size(), 32U);
-    request.if_none_match = "\"x\", W/\"" + first.etag + "\"";
+    ASSERT_TRUE(first.etag);
+    request.if_none_match = "\"x\", W/\"" + to_hex(*first.etag) + "\"";
     const HttpResponse second = asked(router, request);
     EXPECT_EQ(second.status, 304U);
     EXPECT_FALSE(second.body);
     EXPECT_EQ(second.etag, first.etag);
-    EXPECT_EQ(asked(router, get("/healthz")).etag, "");
+    EXPECT_EQ(asked(router, get("/healthz")).etag, std::nullopt);
     EXPECT_EQ(asked(router, get(router.versioned_prefix() + "/chunks/0/0/0/0.drc")).caching,
               HttpCaching::immutable);
 }
@@ -163,18 +168,49 @@ TEST(Router, AsksTheGuardWhereATokenIsNeeded) {
 
 TEST(Router, AnswersOnceWhateverTheHandlerDoes) {
     Router router(kContent);
-    router.add({.path = "/throws", .handler = [](const auto&, const auto&, const auto&) {
+    using Handled = std::optional<HttpResponse>;
+    router.add({.path = "/throws", .handler = [](const auto&, const auto&, const auto&) -> Handled {
                     throw std::runtime_error("broken");
                 }});
-    router.add({.path = "/forgets", .handler = [](const auto&, const auto&, const auto&) {}});
-    router.add(
-        {.path = "/twice", .handler = [](const auto&, const auto&, const HttpRespond& respond) {
-             respond({});
-             respond(http_problem(500, "again"));
-         }});
-    EXPECT_EQ(asked(router, get("/throws")).status, 500U);
-    EXPECT_EQ(asked(router, get("/forgets")).status, 500U);
+    router.add({.path = "/throws-late",
+                .handler = [](const auto&, const auto&, const HttpLater& later) -> Handled {
+                    const HttpRespond respond = later();
+                    throw std::runtime_error("broken");
+                }});
+    router.add({.path = "/forgets",
+                .handler = [](const auto&, const auto&, const auto&) -> Handled { return {}; }});
+    router.add({.path = "/forgets-late",
+                .handler = [](const auto&, const auto&, const HttpLater& later) -> Handled {
+                    later();
+                    return {};
+                }});
+    router.add({.path = "/twice",
+                .handler = [](const auto&, const auto&, const HttpLater& later) -> Handled {
+                    const HttpRespond respond = later();
+                    respond({});
+                    respond(http_problem(500, "again"));
+                    return {};
+                }});
+    for (const char* path : {"/throws", "/throws-late", "/forgets", "/forgets-late"}) {
+        EXPECT_EQ(asked(router, get(path)).status, 500U) << path;
+    }
     EXPECT_EQ(asked(router, get("/twice")).status, 200U);
+}
+
+TEST(Router, AnswersThatComeLaterHaveTagsToo) {
+    Router router(kContent);
+    router.add({.path = "/later",
+                .handler = [](const auto&, const auto&,
+                              const HttpLater& later) -> std::optional<HttpResponse> {
+                    later()(http_ok("text/plain", http_body("late")));
+                    return {};
+                }});
+    HttpRequest request = get("/later");
+    const HttpResponse first = asked(router, request);
+    EXPECT_EQ(first.caching, HttpCaching::revalidate);
+    ASSERT_TRUE(first.etag);
+    request.if_none_match = '"' + to_hex(*first.etag) + '"';
+    EXPECT_EQ(asked(router, request).status, 304U);
 }
 
 TEST(RouteParams, ReadsIntegersInOneSpelling) {

@@ -90,10 +90,8 @@ TEST(Serve, ReadsItsTokensAgainAtSighup) {
                               "--tokens", tokens.string(), "--anonymous", "no"});
     const auto lets_in = [&](const std::string& token) {
         RawClient client(serve.port());
-        client.send(ClientHello{.protocol_version = kProtocolVersion,
-                                .client_name = "raw",
-                                .token = token,
-                                .formats = {}});
+        client.send(ClientHello{
+            .protocol_version = kProtocolVersion, .client_name = "raw", .token = token});
         const auto answer = client.next();
         return answer && std::holds_alternative<ServerHello>(answer->message);
     };

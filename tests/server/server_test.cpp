@@ -178,8 +178,8 @@ TEST(Server, AMalformedFrameEndsItsOwnConnectionOnly) {
     const Running r;
     RawClient bystander(r.port());
     ASSERT_TRUE(bystander.hello());
-    const Bytes hello = encode_message(ClientHello{
-        .protocol_version = kProtocolVersion, .client_name = "x", .token = {}, .formats = {}});
+    const Bytes hello = encode_message(
+        ClientHello{.protocol_version = kProtocolVersion, .client_name = "x", .token = {}});
     std::vector<Bytes> bad;
     for (const std::uint32_t length : {0U, 1U, 65537U, 1U << 31U, 0xFFFFFFFFU}) {
         Bytes bytes;
@@ -213,8 +213,7 @@ TEST(Server, AMalformedFrameEndsItsOwnConnectionOnly) {
 TEST(Server, RefusesAnotherProtocolVersion) {
     const Running r;
     RawClient client(r.port());
-    client.send(
-        ClientHello{.protocol_version = 99, .client_name = "x", .token = {}, .formats = {}});
+    client.send(ClientHello{.protocol_version = 99, .client_name = "x", .token = {}});
     const auto failure = client.next_as<Failure>();
     ASSERT_TRUE(failure);
     EXPECT_EQ(failure->error.code, ErrorCode::version_mismatch);
@@ -259,10 +258,8 @@ TEST(Server, RefusesSessionsAboveItsLimits) {
         EXPECT_TRUE(third.is_closed());
         for (int i = 0; i < 20; ++i) {  // what it sends first must not take the answer away
             RawClient hasty(r.port());
-            hasty.send(ClientHello{.protocol_version = kProtocolVersion,
-                                   .client_name = "hasty",
-                                   .token = {},
-                                   .formats = {}});
+            hasty.send(ClientHello{
+                .protocol_version = kProtocolVersion, .client_name = "hasty", .token = {}});
             EXPECT_TRUE(hasty.next_as<Failure>());
         }
     }

@@ -74,7 +74,7 @@ class Mailbox {
 };
 
 inline ClientHello client_hello(std::uint32_t version = kProtocolVersion) {
-    return {.protocol_version = version, .client_name = "test", .token = {}, .formats = {}};
+    return {.protocol_version = version, .client_name = "test", .token = {}};
 }
 
 inline ChunkRequest chunk_request(std::uint32_t id, std::vector<ChunkPos> keys,

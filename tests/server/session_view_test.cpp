@@ -284,6 +284,7 @@ TEST(SessionView, RefusesMoreRequestsASecondThanTheCap) {
     ASSERT_EQ(f.others.size(), 1U);
     EXPECT_EQ(failure_code(f.others[0]), ErrorCode::busy);
     EXPECT_EQ(std::get<Failure>(f.others[0]).request_id, 5U);
+    EXPECT_EQ(f.counters.limited, 1U);
     const std::uint32_t wait_ms = std::get<Failure>(f.others[0]).retry_after_ms;
     EXPECT_GT(wait_ms, 0U);
     f.now += std::chrono::milliseconds(wait_ms);

@@ -124,8 +124,7 @@ class WebSocketClient {
     }
 
     bool hello() {
-        send(ClientHello{
-            .protocol_version = kProtocolVersion, .client_name = "ws", .token = {}, .formats = {}});
+        send(ClientHello{.protocol_version = kProtocolVersion, .client_name = "ws", .token = {}});
         const auto reply = next();
         return reply && std::holds_alternative<ServerHello>(reply->message);
     }

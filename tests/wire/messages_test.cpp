@@ -142,17 +142,6 @@ TEST(Messages, FormatsAre0To2AndOthersUnsupported) {
     }
 }
 
-TEST(Messages, FormatsOfANewerClientAreLeftOut) {
-    const auto message = decode_built([](auto& builder) {
-        const auto formats =
-            builder.CreateVector(std::vector{static_cast<wire::Format>(77), wire::Format::Columns});
-        return std::pair(wire::Body::ClientHello,
-                         wire::CreateClientHello(builder, 1, 0, 0, formats).Union());
-    });
-    ASSERT_TRUE(message) << message.error().message;
-    EXPECT_EQ(std::get<ClientHello>(*message).formats, std::vector{ChunkFormat::columns});
-}
-
 TEST(Messages, ColumnsFartherThan2To53AreOutOfRange) {
     for (const std::int64_t far :
          {kColumnCoordinateLimit, -kColumnCoordinateLimit, std::numeric_limits<std::int64_t>::min(),

@@ -12,10 +12,7 @@ inline std::vector<AnyMessage> sample_messages() {
                                      {.material = 1, .concentration = 0.25}};
     const ChunkPos key{.lod = 0, .x = -1, .y = 2, .z = 2147483647};
     return {
-        ClientHello{.protocol_version = 1,
-                    .client_name = "test",
-                    .token = "secret",
-                    .formats = {ChunkFormat::draco, ChunkFormat::columns}},
+        ClientHello{.protocol_version = 1, .client_name = "test", .token = "secret"},
         ServerHello{
             .protocol_version = 1,
             .server_version = "0.1.0",

@@ -36,8 +36,7 @@ void LoadClient::open(Clock::time_point now) {
     output_ = carrier_->opening();
     send(ClientHello{.protocol_version = kProtocolVersion,
                      .client_name = "terrane-client load",
-                     .token = options_.token,
-                     .formats = {options_.format}});
+                     .token = options_.token});
 }
 
 void LoadClient::leave() {

@@ -7,12 +7,12 @@
 import * as codec from './codec.js';
 import {
     FailureCode,
-    Format,
     TerraneError,
     keyName,
     type Chunk,
     type ChunkKey,
     type Column,
+    type Format,
     type ServerHello,
     type View,
     type World,
@@ -32,7 +32,6 @@ export interface ClientOptions {
     /** What the server logs. */
     name?: string;
     token?: string;
-    formats?: Format[];
 }
 
 export interface ChunkRequestOptions extends codec.RequestOptions {
@@ -138,7 +137,6 @@ export class TerraneClient {
                 codec.clientHello({
                     name: options.name ?? 'terrane-client (TypeScript)',
                     token: options.token ?? '',
-                    formats: options.formats ?? [Format.Draco, Format.Columns],
                 }),
             );
         }).catch((error: unknown) => {

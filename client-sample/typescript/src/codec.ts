@@ -73,12 +73,11 @@ function frameOf(type: Body, fill: Fill, bytes = 256): Uint8Array {
     return makeFrame(builder.asUint8Array());
 }
 
-export function clientHello(options: { name: string; token: string; formats: Format[] }): Uint8Array {
+export function clientHello(options: { name: string; token: string }): Uint8Array {
     return frameOf(Body.ClientHello, (builder) => {
         const name = builder.createString(options.name);
         const token = builder.createString(options.token);
-        const formats = ClientHello.createFormatsVector(builder, options.formats);
-        return ClientHello.createClientHello(builder, PROTOCOL_VERSION, name, token, formats);
+        return ClientHello.createClientHello(builder, PROTOCOL_VERSION, name, token);
     });
 }
 

@@ -76,10 +76,7 @@ class LoadConnection {
                 die("no WebSocket: " + head);
             }
         }
-        send(ClientHello{.protocol_version = kProtocolVersion,
-                         .client_name = "load",
-                         .token = {},
-                         .formats = {}});
+        send(ClientHello{.protocol_version = kProtocolVersion, .client_name = "load", .token = {}});
         wait_for_messages(1);
         send_request(1);
         wait_for_messages(1);  // the chunk is in the cache now
