@@ -273,6 +273,10 @@ export class TerrainMaterials {
     setGhost(share: number): void {
         this.ghost.value = share;
         const isGhost = share > 0;
+        // Rivers are hollows too: the X-ray shows them.
+        for (const material of this.water.all) {
+            material.visible = !isGhost;
+        }
         for (const material of this.ground.all) {
             if (material.transparent !== isGhost) {
                 material.transparent = isGhost;

@@ -42,7 +42,6 @@ uniform sampler2D uSlopes;
 uniform vec3 uOriginPart;
 uniform float uTime;
 uniform float uFade;
-uniform float uGhost;
 varying vec3 vWorld;
 varying vec3 vNormalWorld;
 varying vec3 vColor;
@@ -98,7 +97,7 @@ void main() {
     shown = withFog(shown / alpha, cameraPosition, vWorld);
     // Far away the bed is not to be told from its fog.
     alpha = mix(alpha, 1.0, smoothstep(1500.0, 6000.0, distance) * step(0.4, vDepth));
-    gl_FragColor = vec4(shown, alpha * mix(1.0, 0.35, uGhost));
+    gl_FragColor = vec4(shown, alpha);
     #include <tonemapping_fragment>
     #include <colorspace_fragment>
 }

@@ -12,7 +12,7 @@ const MIX_HEIGHT = 12;
 const MIX_LINES_MAX = 3;
 /** Between two labels, and between two heights. */
 const LABEL_GAP = 3;
-const HEIGHT_GAP = 10;
+const HEIGHT_GAP = 12;
 const SVG = 'http://www.w3.org/2000/svg';
 
 interface Layer {
