@@ -11,6 +11,7 @@ export type Piece = TerrainMesh & { y: number };
 const DEPTH_UNITS_PER_VOXEL = 8;
 /** Ground that stands so much higher than water is over it, not its shore. */
 const OVER_WATER = 3;
+const ON_SIDE = 1 / 256;
 
 export function surfacesOf(materials: Material[]): Surface[] {
     return materials.map(surfaceOf);
@@ -86,15 +87,18 @@ function indicesByPart(pieces: Piece[], vertices: number, corners: number) {
     return { indices, firsts };
 }
 
-/** How deep the water is under each of its vertices: its level less the bed around, column by column. */
+/** How deep the water is under each of its vertices: its level less the bed around, column by column. On
+ * a tile's sides only what lies on the side counts, which the next tile has too: they agree there. */
 function setDepths(shown: Uint8Array, positions: Float32Array, water: number[]): void {
     let side = 0;
     for (let at = 0; at < positions.length; at += 3) {
         side = Math.max(side, positions[at]!, positions[at + 2]!);
     }
-    const width = Math.round(side) + 1;
-    const cellOf = (vertex: number) =>
-        Math.max(Math.round(positions[3 * vertex]!), 0) + width * Math.max(Math.round(positions[3 * vertex + 2]!), 0);
+    const last = Math.round(side);
+    const width = last + 1;
+    const columnOf = (place: number) =>
+        place <= ON_SIDE ? 0 : place >= last - ON_SIDE ? last : Math.min(Math.max(Math.round(place), 1), last - 1);
+    const cellOf = (vertex: number) => columnOf(positions[3 * vertex]!) + width * columnOf(positions[3 * vertex + 2]!);
     const level = new Float32Array(width * width).fill(-Infinity);
     const isWater = new Uint8Array(positions.length / 3);
     for (const vertex of water) {
@@ -117,8 +121,10 @@ function setDepths(shown: Uint8Array, positions: Float32Array, water: number[]):
         let sum = 0;
         let count = 0;
         for (let i = 0; i < 9; ++i) {
-            const [cx, cz] = [x + (i % 3) - 1, z + Math.floor(i / 3) - 1];
-            const under = cx >= 0 && cx < width && cz >= 0 && cz < width ? bed[cx + width * cz]! : -Infinity;
+            const isOnSide = (column: number) => column === 0 || column === last;
+            const cx = x + (isOnSide(x) ? 0 : (i % 3) - 1);
+            const cz = z + (isOnSide(z) ? 0 : Math.floor(i / 3) - 1);
+            const under = bed[cx + width * cz]!;
             if (under > -Infinity) {
                 sum += under;
                 ++count;
