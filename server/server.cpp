@@ -66,14 +66,19 @@ ServerHello hello_of(const World& world, std::int32_t tileset_levels) {
                       .levels = levels_supported(),
                       .height_bound_voxels = world.stack.height_bound,
                       .materials = {},
-                      .limits = {}};  // every session tells its own
+                      .limits = {},  // every session tells its own
+                      .mesh_parts = definition.has_landscape()};
+    static_assert(
+        static_cast<int>(WireMaterialKind::cave) == static_cast<int>(MaterialKind::cave) &&
+        static_cast<int>(WireMaterialKind::water) == static_cast<int>(MaterialKind::water));
     for (const Material& material : definition.materials) {
         const Rgb8 color = material.color;
         hello.materials.push_back({.name = material.name,
                                    .color_rgb = (std::uint32_t{color.r} << 16U) |
                                                 (std::uint32_t{color.g} << 8U) | color.b,
                                    .texture = material.texture,
-                                   .solid = is_solid(material.kind)});
+                                   .solid = is_solid(material.kind),
+                                   .kind = static_cast<WireMaterialKind>(material.kind)});
     }
     return hello;
 }

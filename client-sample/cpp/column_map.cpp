@@ -2,6 +2,7 @@
 
 #include "client-sample/cpp/chunk_reader.h"
 #include "client-sample/cpp/view_set.h"
+#include "generator/mesh/mesh_world.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,17 +17,20 @@ namespace {
 /// Voxels below and above a chunk that its mesh depends on: a cell, and kDistanceMax256 of it.
 constexpr std::int32_t kReachVoxels = 5;
 
-/// All that the meshers read of a definition: the materials' colours.
-WorldDefinition colors_of(const ServerHello& world) {
-    WorldDefinition definition;
+/// All that the meshers read of a definition.
+WorldDefinition mesh_world_of(const ServerHello& world) {
+    static_assert(static_cast<int>(MaterialKind::water) ==
+                  static_cast<int>(WireMaterialKind::water));
+    std::vector<Material> materials;
     for (const WireMaterial& wire : world.materials) {
         Material material;
         material.color = {.r = static_cast<std::uint8_t>(wire.color_rgb >> 16U),
                           .g = static_cast<std::uint8_t>(wire.color_rgb >> 8U),
                           .b = static_cast<std::uint8_t>(wire.color_rgb)};
-        definition.materials.push_back(std::move(material));
+        material.kind = static_cast<MaterialKind>(wire.kind);
+        materials.push_back(std::move(material));
     }
-    return definition;
+    return mesh_world(std::move(materials), world.mesh_parts);
 }
 
 std::string to_text(ChunkPos key) {
@@ -81,26 +85,19 @@ class ColumnMap::Gathering {
   public:
     Gathering(const ColumnMap& map, Palette& palette) : map_(map), palette_(palette) {}
 
-    struct Heights {
-        std::int32_t first = 0;
-        std::int32_t last = 0;  ///< included
-    };
-
-    /// The stack's chunks from `first` to `last`; null if one is not held.
+    /// The stack's chunks; null if one from `first` to `last` is not held.
     const std::vector<Piece>* find(StackPos stack, Heights heights) {
         const auto known = pieces_.find(stack);
         if (known != pieces_.end()) {
             return known->second ? &*known->second : nullptr;
         }
         std::optional<std::vector<Piece>>& pieces = pieces_[stack];
+        const auto chunks = chunks_of(stack, heights);
+        if (chunks.empty()) {
+            return nullptr;
+        }
         pieces.emplace();
-        for (std::int32_t y = heights.first; y <= heights.last; ++y) {
-            const Chunk* const chunk =
-                map_.find({.lod = stack.lod, .x = stack.x, .y = y, .z = stack.z});
-            if (chunk == nullptr) {
-                pieces.reset();
-                return nullptr;
-            }
+        for (const Chunk* chunk : chunks) {
             pieces->push_back({.chunk = chunk, .palette_first = palette_.size()});
             if (chunk->uniform) {
                 palette_.push_back(chunk->uniform_content);
@@ -111,8 +108,8 @@ class ColumnMap::Gathering {
         return &*pieces;
     }
 
-    /// The column that is number (x, z) of level `lod`, from that level or a finer one, all of
-    /// whose columns are the finer one's too. False if none is held.
+    /// The column that is number (x, z) of level `lod`, from that level or a finer one, which has
+    /// the same column (in a landscape with caves and overhangs too). False if none is held.
     bool append(Limits& out, std::int32_t lod, ColumnPos place, Heights heights) {
         for (std::int32_t level = lod; level >= 0; --level) {
             const std::int64_t x = place.x << (lod - level);
@@ -120,9 +117,7 @@ class ColumnMap::Gathering {
             const StackPos stack{.lod = level,
                                  .x = static_cast<std::int32_t>(floor_div(x, map_.side_)),
                                  .z = static_cast<std::int32_t>(floor_div(z, map_.side_))};
-            const Heights own =
-                level == lod ? heights
-                             : Heights{.first = 0, .last = level == 0 ? map_.heights_ - 1 : 0};
+            const Heights own = level == lod ? heights : map_.whole_stack(level);
             if (const auto* pieces = find(stack, own)) {
                 append(out, *pieces,
                        {.x = floor_mod(x, map_.side_), .z = floor_mod(z, map_.side_)});
@@ -139,15 +134,46 @@ class ColumnMap::Gathering {
             append_part(out, first, piece, static_cast<std::int32_t>(local.x),
                         static_cast<std::int32_t>(local.z), palette_);
         }
-        const auto is_void = [&](std::size_t i) {
-            return palette_[out[i].palette_id].kind == PaletteKind::void_;
+        // Water is a void of another content: its surface stays.
+        const auto entry = [&](std::size_t i) -> const PaletteEntry& {
+            return palette_[out[i].palette_id];
         };
-        while (out.size() > first + 1 && is_void(out.size() - 1) && is_void(out.size() - 2)) {
+        while (out.size() > first + 1 && entry(out.size() - 1).kind == PaletteKind::void_ &&
+               entry(out.size() - 2).kind == PaletteKind::void_ &&
+               entry(out.size() - 1).composition == entry(out.size() - 2).composition) {
             out.pop_back();
         }
     }
 
   private:
+    /// Bottom first; none if one that must be is not held. Of the air over all that is there one
+    /// chunk is enough.
+    std::vector<const Chunk*> chunks_of(StackPos stack, Heights heights) const {
+        std::vector<const Chunk*> chunks;
+        const auto held = map_.stacks_.find(stack);
+        if (held == map_.stacks_.end()) {
+            return chunks;
+        }
+        for (std::int32_t y = heights.first; y <= heights.highest; ++y) {
+            const auto chunk = held->second.find(y);
+            if (chunk == held->second.end()) {
+                if (y <= heights.last) {
+                    return {};
+                }
+                break;
+            }
+            chunks.push_back(&chunk->second);
+        }
+        const auto is_air = [&](const Chunk& chunk) {
+            return chunk.uniform && chunk.uniform_content.kind == PaletteKind::void_ &&
+                   !map_.is_water(chunk.uniform_content);
+        };
+        while (chunks.size() > 1 && is_air(*chunks.back()) && is_air(*chunks[chunks.size() - 2])) {
+            chunks.pop_back();
+        }
+        return chunks;
+    }
+
     const ColumnMap& map_;
     Palette& palette_;
     std::map<StackPos, std::optional<std::vector<Piece>>> pieces_;
@@ -158,8 +184,8 @@ ColumnMap::ColumnMap(const ServerHello& world)
       height_(world.chunk_height),
       heights_(heights_of(0, world)),
       hello_(world),
-      surface_mesher_(colors_of(world)),
-      tile_mesher_(colors_of(world)) {}
+      surface_mesher_(mesh_world_of(world)),
+      tile_mesher_(mesh_world_of(world)) {}
 
 Result<void> ColumnMap::put(const ChunkAnswer& answer, std::span<const std::byte> payload) {
     if (answer.format != ChunkFormat::columns) {
@@ -181,7 +207,18 @@ Result<void> ColumnMap::put(const ChunkAnswer& answer, std::span<const std::byte
 
 void ColumnMap::put(Chunk chunk) {
     const ChunkPos key = chunk.position;
-    chunks_.insert_or_assign(key, std::move(chunk));
+    size_ += stacks_[stack_of(key)].insert_or_assign(key.y, std::move(chunk)).second ? 1U : 0U;
+}
+
+void ColumnMap::forget(ChunkPos key) {
+    const auto stack = stacks_.find(stack_of(key));
+    if (stack == stacks_.end()) {
+        return;
+    }
+    size_ -= stack->second.erase(key.y);
+    if (stack->second.empty()) {
+        stacks_.erase(stack);
+    }
 }
 
 /// Its kind follows from its main material: void and caves are the ones that are not solid.
@@ -203,9 +240,19 @@ Chunk ColumnMap::uniform_chunk(const ChunkAnswer& answer) const {
     return chunk;
 }
 
+bool ColumnMap::is_water(const PaletteEntry& entry) const {
+    const auto shares = entry.composition.shares();
+    return !entry.is_solid() && !shares.empty() &&
+           hello_.materials[shares[0].material].kind == WireMaterialKind::water;
+}
+
 const Chunk* ColumnMap::find(ChunkPos key) const {
-    const auto found = chunks_.find(key);
-    return found == chunks_.end() ? nullptr : &found->second;
+    const auto stack = stacks_.find(stack_of(key));
+    if (stack == stacks_.end()) {
+        return nullptr;
+    }
+    const auto found = stack->second.find(key.y);
+    return found == stack->second.end() ? nullptr : &found->second;
 }
 
 std::optional<Voxel> ColumnMap::voxel(VoxelPos place) const {
@@ -244,8 +291,7 @@ std::optional<bool> ColumnMap::is_solid(VoxelPos place) const {
 std::optional<HeldColumn> ColumnMap::column(ColumnPos place) const {
     HeldColumn column;
     Gathering gathering(*this, column.palette);
-    const auto* const pieces =
-        gathering.find(stack_of(place, side_), {.first = 0, .last = heights_ - 1});
+    const auto* const pieces = gathering.find(stack_of(place, side_), whole_stack(0));
     if (pieces == nullptr) {
         return std::nullopt;
     }
@@ -279,10 +325,30 @@ std::optional<double> ColumnMap::ground_under(ColumnPos place, double from_y) co
     return ground;
 }
 
-std::vector<ChunkPos> ColumnMap::needed_for_mesh(ChunkPos key) const {
-    const std::int32_t reach = key.lod > 0 ? 0 : (kReachVoxels + height_ - 1) / height_;
-    const std::int32_t last = key.lod > 0 ? 0 : heights_ - 1;
-    std::vector<ChunkPos> needed;
+ColumnMap::Heights ColumnMap::whole_stack(std::int32_t lod) const {
+    const std::int32_t top = lod == 0 ? heights_ - 1 : 0;
+    return {.first = 0, .last = top, .highest = top};
+}
+
+/// The chunks of each stack that a mesh depends on; none if it is of heights that no stack has.
+ColumnMap::Heights ColumnMap::heights_for_mesh(ChunkPos key) const {
+    const std::int32_t top = key.lod > 0 ? 0 : heights_ - 1;
+    if (key.y < 0 || key.y > top) {
+        return {.first = 0, .last = -1, .highest = -1};
+    }
+    if (key.lod > 0) {
+        return {};
+    }
+    const std::int32_t reach = (kReachVoxels + height_ - 1) / height_;
+    const std::int32_t last = std::min(key.y + reach, top);
+    return {.first = std::max(key.y - reach, 0),
+            .last = last,
+            .highest = hello_.mesh_parts ? top : last};
+}
+
+std::vector<ChunkPos> ColumnMap::missing_for_mesh(ChunkPos key) const {
+    std::vector<ChunkPos> missing;
+    const Heights heights = heights_for_mesh(key);
     for (std::int32_t z = -1; z <= 1; ++z) {
         for (std::int32_t x = -1; x <= 1; ++x) {
             const std::int64_t at_x = std::int64_t{key.x} + x;
@@ -291,41 +357,35 @@ std::vector<ChunkPos> ColumnMap::needed_for_mesh(ChunkPos key) const {
                 at_z != static_cast<std::int32_t>(at_z)) {
                 continue;
             }
-            for (std::int32_t y = std::max(key.y - reach, 0); y <= std::min(key.y + reach, last);
-                 ++y) {
-                needed.push_back({.lod = key.lod,
+            const StackPos beside{.lod = key.lod,
                                   .x = static_cast<std::int32_t>(at_x),
-                                  .y = y,
-                                  .z = static_cast<std::int32_t>(at_z)});
+                                  .z = static_cast<std::int32_t>(at_z)};
+            const auto held = stacks_.find(beside);
+            for (std::int32_t y = heights.first; y <= heights.highest; ++y) {
+                if (held == stacks_.end() || !held->second.contains(y)) {
+                    missing.push_back({.lod = beside.lod, .x = beside.x, .y = y, .z = beside.z});
+                }
             }
         }
     }
-    return needed;
-}
-
-std::vector<ChunkPos> ColumnMap::missing_for_mesh(ChunkPos key) const {
-    auto missing = needed_for_mesh(key);
-    std::erase_if(missing, [&](ChunkPos needed) { return holds(needed); });
     return missing;
 }
 
 Result<Mesh> ColumnMap::mesh(ChunkPos key, MissingNeighbour missing) {
+    const Heights heights = heights_for_mesh(key);
     const auto lacking = missing_for_mesh(key);
     const auto is_fatal = [&](ChunkPos lacked) {
-        return missing == MissingNeighbour::refuse || stack_of(lacked) == stack_of(key);
+        return missing == MissingNeighbour::refuse ||
+               (stack_of(lacked) == stack_of(key) && lacked.y <= heights.last);
     };
     if (const auto found = std::ranges::find_if(lacking, is_fatal); found != lacking.end()) {
         return fail(ErrorCode::not_found, to_text(key) + ": its mesh needs " + to_text(*found) +
                                               ", which is not held; ask for it");
     }
     Mesh mesh;
-    const std::int32_t last_height = key.lod > 0 ? 0 : heights_ - 1;
-    if (key.y < 0 || key.y > last_height) {
+    if (heights.first > heights.last) {
         return mesh;
     }
-    const std::int32_t reach = key.lod > 0 ? 0 : (kReachVoxels + height_ - 1) / height_;
-    const Gathering::Heights heights{.first = std::max(key.y - reach, 0),
-                                     .last = std::min(key.y + reach, last_height)};
     Stack stack;
     stack.position = stack_of(key);
     stack.side = side_;

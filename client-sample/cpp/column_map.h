@@ -4,8 +4,14 @@
 // A chunk carries its own N x N columns from its floor to its ceiling. A mesh needs a little more:
 // one column on each side, since a surface's quads reach there, and five voxels below and above,
 // since normals look that far. So a mesh is made of the chunk and its neighbours: the eight beside
-// it at levels above 0, at level 0 those above and below them too. What the map does not hold of
-// them is named by `missing_for_mesh`; all of them together give exactly the server's mesh.
+// it at levels above 0, at level 0 those above and below them too.
+//
+// In a landscape a mesh tells ground, caves and water apart (mesh.h). A cave is what has
+// kCaveRoofVoxels of rock overhead, all rock counted together however far up it lies. So at level 0
+// such a mesh needs every chunk above, up to the height bound; most are empty and cost nothing.
+//
+// What the map does not hold of all these is named by `missing_for_mesh`; all of them together give
+// exactly the server's mesh: its vertices, triangles and parts in its order.
 #pragma once
 
 #include "generator/mesh/height_field.h"
@@ -45,6 +51,8 @@ enum class MissingNeighbour : std::uint8_t {
     refuse,  ///< no mesh
     repeat,  ///< the last column is repeated: at the rim of what is held, where a coarser level
              ///< begins and its skirts hide the seam. Takes finer columns where those are held.
+             ///< Rock counts as overhead up to the first chunk that is not held, so that a cave
+             ///< may be called ground.
 };
 
 /// One thread at a time. It holds what it is given until `forget`: the view bounds it.
@@ -61,14 +69,14 @@ class ColumnMap {
     /// Keeps a chunk that read_chunk gave.
     void put(Chunk chunk);
 
-    void forget(ChunkPos key) { chunks_.erase(key); }
+    void forget(ChunkPos key);
 
-    bool holds(ChunkPos key) const { return chunks_.contains(key); }
+    bool holds(ChunkPos key) const { return find(key) != nullptr; }
 
     /// Null if it is not held.
     const Chunk* find(ChunkPos key) const;
 
-    std::size_t size() const { return chunks_.size(); }
+    std::size_t size() const { return size_; }
 
     /// Nothing where no chunk of level 0 is held.
     std::optional<Voxel> voxel(VoxelPos place) const;
@@ -87,22 +95,35 @@ class ColumnMap {
     /// The chunks that a mesh of `key` needs and the map lacks, itself included.
     std::vector<ChunkPos> missing_for_mesh(ChunkPos key) const;
 
-    /// The mesh of a held chunk as the server would make it; empty where no surface is. Positions
-    /// as in mesh.h. Fails with `not_found`, naming a chunk that is missing.
+    /// The mesh of a held chunk as the server would make it, parts included; empty where no surface
+    /// is. Positions as in mesh.h. Fails with `not_found`, naming a chunk that is missing; `repeat`
+    /// makes do with the chunk itself and those of its stack within five voxels of it.
     Result<Mesh> mesh(ChunkPos key, MissingNeighbour missing = MissingNeighbour::refuse);
 
   private:
     class Gathering;
 
+    /// Chunks of a stack, all ends included.
+    struct Heights {
+        std::int32_t first = 0;
+        std::int32_t last = 0;
+        std::int32_t highest = 0;  ///< those over `last` are for the rock overhead
+    };
+
+    using HeldStack = std::map<std::int32_t, Chunk>;  ///< by y
+
     /// Its content throughout, as the answer to a uniform chunk says it.
     Chunk uniform_chunk(const ChunkAnswer& answer) const;
-    std::vector<ChunkPos> needed_for_mesh(ChunkPos key) const;
+    bool is_water(const PaletteEntry& entry) const;
+    Heights whole_stack(std::int32_t lod) const;
+    Heights heights_for_mesh(ChunkPos key) const;
 
     std::int32_t side_;
     std::int32_t height_;
     std::int32_t heights_;  ///< chunks of a stack of level 0
     ServerHello hello_;
-    std::map<ChunkPos, Chunk> chunks_;
+    std::map<StackPos, HeldStack> stacks_;
+    std::size_t size_ = 0;
     SurfaceNetsMesher surface_mesher_;
     HeightFieldMesher tile_mesher_;
 };

@@ -12,8 +12,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-/// A mesh depends on chunks so many away, at most: two where chunks are 4 voxels high.
-constexpr std::int32_t kHeightsBesideMax = 2;
+/// A mesh depends on chunks so many below, at most: two where chunks are 4 voxels high.
+constexpr std::int32_t kHeightsBelowMax = 2;
 
 }  // namespace
 
@@ -196,10 +196,12 @@ void Terrain::mesh_if_ready(ChunkPos key, std::vector<TerrainChange>& changes) {
 
 /// A chunk that has come may be what its neighbours waited for.
 void Terrain::mesh_around(ChunkPos key, std::vector<TerrainChange>& changes) {
-    const std::int32_t reach = key.lod > 0 ? 0 : kHeightsBesideMax;
+    const std::int32_t above = key.lod > 0 ? 0 : kHeightsBelowMax;
+    const std::int32_t below =
+        key.lod == 0 && world().mesh_parts ? std::clamp(key.y, 0, heights_of(0, world())) : above;
     for (std::int32_t z = -1; z <= 1; ++z) {
         for (std::int32_t x = -1; x <= 1; ++x) {
-            for (std::int32_t y = -reach; y <= reach; ++y) {
+            for (std::int32_t y = -below; y <= above; ++y) {
                 mesh_if_ready({.lod = key.lod, .x = key.x + x, .y = key.y + y, .z = key.z + z},
                               changes);
             }

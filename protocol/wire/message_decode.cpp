@@ -97,6 +97,13 @@ Result<AnyMessage> read(const wire::ClientHello& table) {
                        .token = std::move(*token)};
 }
 
+WireMaterialKind kind_of(const wire::Material& table) {
+    if (table.kind() > wire::MaterialKind::MAX) {
+        return table.solid() ? WireMaterialKind::regular : WireMaterialKind::void_;
+    }
+    return static_cast<WireMaterialKind>(table.kind());
+}
+
 Result<WireMaterial> material_of(const wire::Material& table) {
     auto name = text_of(table.name(), kWireNameBytesMax, "ServerHello.materials.name");
     auto texture = text_of(table.texture(), kWireNameBytesMax, "ServerHello.materials.texture");
@@ -106,7 +113,8 @@ Result<WireMaterial> material_of(const wire::Material& table) {
     return WireMaterial{.name = std::move(*name),
                         .color_rgb = table.color_rgb() & 0xFFFFFFU,
                         .texture = std::move(*texture),
-                        .solid = table.solid()};
+                        .solid = table.solid(),
+                        .kind = kind_of(table)};
 }
 
 Result<void> check_geometry(const wire::ServerHello& table) {
@@ -169,7 +177,8 @@ Result<AnyMessage> read(const wire::ServerHello& table) {
                    .view_radius_max = table.limits()->view_radius_max(),
                    .credit_window_bytes = table.limits()->credit_window_bytes(),
                    .requests_per_second_max = table.limits()->requests_per_second_max(),
-                   .bytes_per_second_max = table.limits()->bytes_per_second_max()}};
+                   .bytes_per_second_max = table.limits()->bytes_per_second_max()},
+        .mesh_parts = table.mesh_parts()};
     for (std::size_t i = 0; i < size_of(table.materials()); ++i) {
         auto material =
             material_of(*table.materials()->Get(static_cast<flatbuffers::uoffset_t>(i)));

@@ -106,8 +106,9 @@ Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& h
     for (const WireMaterial& material : hello.materials) {
         const auto name = text_of(builder, material.name, kWireNameBytesMax);
         const auto texture = text_of(builder, material.texture, kWireNameBytesMax);
-        materials.push_back(
-            wire::CreateMaterial(builder, name, material.color_rgb, texture, material.solid));
+        materials.push_back(wire::CreateMaterial(builder, name, material.color_rgb, texture,
+                                                 material.solid,
+                                                 static_cast<wire::MaterialKind>(material.kind)));
     }
     const auto materials_at = builder.CreateVector(materials);
     const WireLimits& limits = hello.limits;
@@ -123,7 +124,7 @@ Offset<wire::ServerHello> write(FlatBufferBuilder& builder, const ServerHello& h
                                    hello.generator_version, hello.encoding_version, world_name,
                                    &fingerprint, &content_id, hello.chunk_side, hello.chunk_height,
                                    hello.voxel_size_m, hello.levels, hello.height_bound_voxels,
-                                   materials_at, limits_at);
+                                   materials_at, limits_at, hello.mesh_parts);
 }
 
 Offset<wire::ChunkRequest> write(FlatBufferBuilder& builder, const ChunkRequest& request) {

@@ -51,11 +51,26 @@ struct WireShare {
 /// Main material first; empty where a message has no composition.
 using WireComposition = std::vector<WireShare>;
 
+/// As in a world file.
+enum class WireMaterialKind : std::uint8_t {
+    void_ = 0,
+    base = 1,
+    regular = 2,
+    vein = 3,
+    cave = 4,
+    soil = 5,
+    sand = 6,
+    snow = 7,
+    water = 8
+};
+
 struct WireMaterial {
     std::string name;
     std::uint32_t color_rgb = 0;  ///< 0xRRGGBB, sRGB
     std::string texture;          ///< file name, may be empty
-    bool solid = true;
+    bool solid = true;            ///< one can stand on it
+    /// A kind this build doesn't know is read as regular if it is solid, else as void.
+    WireMaterialKind kind = WireMaterialKind::regular;
 
     friend bool operator==(const WireMaterial&, const WireMaterial&) = default;
 };
@@ -97,6 +112,7 @@ struct ServerHello {
     double height_bound_voxels = 0;
     std::vector<WireMaterial> materials;
     WireLimits limits;
+    bool mesh_parts = false;  ///< meshes are of ground, caves and water: a landscape
 
     friend bool operator==(const ServerHello&, const ServerHello&) = default;
 };

@@ -1,6 +1,7 @@
 #include "server/cli/column.h"
 
 #include "generator/terrain/generate_stack.h"
+#include "generator/world/world_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
@@ -17,8 +18,18 @@
 namespace terrane {
 namespace {
 
-std::string_view kind_name(PaletteKind kind) {
-    switch (kind) {
+/// What lies on a landscape's ground, and its water, are named by their material: in the palette
+/// soil is a vein, and water a void or a cave.
+std::string_view kind_name(const PaletteEntry& entry, std::span<const Material> materials) {
+    const auto shares = entry.composition.shares();
+    if (!shares.empty()) {
+        const MaterialKind kind = materials[shares[0].material].kind;
+        if (kind == MaterialKind::soil || kind == MaterialKind::sand ||
+            kind == MaterialKind::snow || kind == MaterialKind::water) {
+            return to_string(kind);
+        }
+    }
+    switch (entry.kind) {
         case PaletteKind::layer:
             return "layer";
         case PaletteKind::void_:
@@ -96,7 +107,7 @@ std::string column_text(const ColumnReport& column) {
         std::array<char, 80> line{};
         std::snprintf(line.data(), line.size(), "\n%11.3f   %4d %4d %4d   %-5s  ",
                       static_cast<double>(limit.y256) / kUnitsPerVoxel, limit.flow.x, limit.flow.y,
-                      limit.flow.z, kind_name(entry.kind).data());
+                      limit.flow.z, kind_name(entry, column.materials).data());
         text += line.data() + percentages(entry.composition, column.materials);
     }
     return text;

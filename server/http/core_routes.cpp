@@ -169,6 +169,7 @@ std::string world_json(const RouteContext& context, const std::string& versioned
         if (!material.texture.empty()) {
             entry["texture"] = versioned_prefix + "/textures/" + material.texture;
         }
+        entry["kind"] = to_string(material.kind);
         entry["solid"] = is_solid(material.kind);
         materials.push_back(std::move(entry));
     }
@@ -204,6 +205,7 @@ std::string world_json(const RouteContext& context, const std::string& versioned
                          {"column_max", kColumnMax},
                          {"chunk_min", kChunkMin},
                          {"chunk_max", kChunkMax}}},
+                       {"mesh_parts", hello.mesh_parts},
                        {"materials", std::move(materials)},
                        {"links", std::move(links)}};
     return json.dump(2) + "\n";

@@ -51,6 +51,20 @@ TEST(Column, TheTableHasALineALimit) {
     EXPECT_THAT(text, testing::HasSubstr("cave   #"));
 }
 
+TEST(Column, TheTableCallsWhatLiesOnTheGroundAndWaterByTheirKinds) {
+    const auto limits = drawn_column("aA#.");
+    const Palette palette = drawn_palette();
+    auto materials = drawn_materials();
+    materials[4].kind = MaterialKind::soil;
+    materials[5].kind = MaterialKind::water;
+    const std::string text =
+        column_text({.position = {}, .limits = limits, .palette = palette, .materials = materials});
+    EXPECT_THAT(text, testing::HasSubstr("layer  a"));
+    EXPECT_THAT(text, testing::HasSubstr("soil   A"));
+    EXPECT_THAT(text, testing::HasSubstr("water  #"));
+    EXPECT_THAT(text, testing::HasSubstr("void   ."));
+}
+
 struct Outcome {
     int exit_code = 0;
     std::string out;

@@ -224,6 +224,11 @@ TEST(HttpServer, DescribesItsWorld) {
     EXPECT_EQ(world["fingerprint"], to_hex(r.options.world->fingerprint));
     EXPECT_EQ(world["content_id"], to_hex(content_id_of(*r.options.world)));
     EXPECT_EQ(world["materials"].size(), r.options.world->definition.materials.size());
+    EXPECT_EQ(world["mesh_parts"], r.options.world->definition.has_landscape());
+    for (std::size_t i = 0; i < world["materials"].size(); ++i) {
+        EXPECT_EQ(world["materials"][i]["kind"],
+                  to_string(r.options.world->definition.materials[i].kind));
+    }
     const auto file = client.get(std::string(world["links"]["world_file"]));
     ASSERT_TRUE(file);
     EXPECT_EQ(file->body, canonical_world_file(r.options.world->definition));

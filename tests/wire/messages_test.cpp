@@ -155,6 +155,18 @@ TEST(Messages, ColumnsFartherThan2To53AreOutOfRange) {
     }
 }
 
+TEST(Messages, AMaterialOfANewerKindIsWhatItsSolidSays) {
+    auto hello = std::get<ServerHello>(sample_messages()[1]);
+    hello.materials[0].kind = static_cast<WireMaterialKind>(200);
+    hello.materials[1].kind = static_cast<WireMaterialKind>(9);
+    const auto read = decode(encode_message(hello));
+    ASSERT_TRUE(read);
+    const auto& materials = std::get<ServerHello>(*read).materials;
+    EXPECT_EQ(materials[0].kind, WireMaterialKind::regular);
+    EXPECT_EQ(materials[1].kind, WireMaterialKind::void_);
+    EXPECT_EQ(materials[2].kind, WireMaterialKind::water);
+}
+
 TEST(Messages, NumbersThatAreNotFiniteAreMalformed) {
     for (const double value :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0.0,

@@ -15,6 +15,7 @@ import { Credit } from './generated/terrane/wire/credit.js';
 import { Failure as WireFailure } from './generated/terrane/wire/failure.js';
 import { Goodbye } from './generated/terrane/wire/goodbye.js';
 import type { Hash as WireHash } from './generated/terrane/wire/hash.js';
+import type { Material as WireMaterial } from './generated/terrane/wire/material.js';
 import { Message } from './generated/terrane/wire/message.js';
 import { Ping } from './generated/terrane/wire/ping.js';
 import { Pong } from './generated/terrane/wire/pong.js';
@@ -27,6 +28,7 @@ import { Hash as HashStruct } from './generated/terrane/wire/hash.js';
 import { makeFrame, parseFrame } from './frame.js';
 import {
     FailureCode,
+    MaterialKind,
     PROTOCOL_VERSION,
     type Chunk,
     type ChunkKey,
@@ -205,6 +207,11 @@ function sharesOf(composition: Composition | null): Share[] {
     return shares;
 }
 
+function kindOf(material: WireMaterial): MaterialKind {
+    const kind = material.kind();
+    return kind in MaterialKind ? kind : material.solid() ? MaterialKind.Regular : MaterialKind.Void;
+}
+
 function helloOf(hello: WireHello): ServerHello {
     const materials = [];
     for (let i = 0; i < hello.materialsLength(); ++i) {
@@ -214,6 +221,7 @@ function helloOf(hello: WireHello): ServerHello {
             color: material.colorRgb(),
             texture: material.texture() ?? '',
             solid: material.solid(),
+            kind: kindOf(material),
         });
     }
     const limits = hello.limits();
@@ -241,6 +249,7 @@ function helloOf(hello: WireHello): ServerHello {
             requestsPerSecondMax: limits?.requestsPerSecondMax() ?? 0,
             bytesPerSecondMax: Number(limits?.bytesPerSecondMax() ?? 0n),
         },
+        meshParts: hello.meshParts(),
     };
 }
 

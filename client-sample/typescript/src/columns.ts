@@ -36,7 +36,25 @@ export interface TerrainMesh {
     colors: Uint8Array;
     /** The main material of each vertex. */
     materials: Uint8Array;
+    /** What each vertex is of; undefined: all ground. partOf() tells it of a triangle. */
+    parts: Uint8Array | undefined;
     indices: Uint32Array;
+}
+
+/** As in Draco meshes: what a surface is of. */
+export enum MeshPart {
+    Ground = 0,
+    /** Under 24 voxels of rock or more: not seen from above the ground. */
+    Cave = 1,
+    /** The water's own surface: to be seen, not to be walked on. */
+    Water = 2,
+}
+
+/** Of triangle i: the least of its corners', so that what joins a cave to the ground is ground. */
+export function partOf({ parts, indices }: Pick<TerrainMesh, 'parts' | 'indices'>, i: number): MeshPart {
+    return parts === undefined
+        ? MeshPart.Ground
+        : Math.min(parts[indices[3 * i]!]!, parts[indices[3 * i + 1]!]!, parts[indices[3 * i + 2]!]!);
 }
 
 export type MeshOf = 'surface' | 'caves' | 'veins';
@@ -80,7 +98,7 @@ interface Exports {
     _initialize(): void;
     room_buffer(bytes: number): number;
     room_error(): number;
-    room_open(side: number, height: number, heights: number, materials: number): number;
+    room_open(side: number, height: number, heights: number, materials: number, meshParts: number): number;
     room_put(bytes: number): number;
     room_put_uniform(lod: number, x: number, y: number, z: number, kind: number, shares: number): number;
     room_drop(lod: number, x: number, z: number): void;
@@ -93,6 +111,7 @@ interface Exports {
     mesh_normals(): number;
     mesh_colors(): number;
     mesh_materials(): number;
+    mesh_parts(): number;
     mesh_indices(): number;
     room_section(x0: number, z0: number, x1: number, z1: number, y0: number, y1: number, width: number, height: number): void;
     section_colors(): number;
@@ -191,11 +210,12 @@ export class ColumnRoom {
     ) {
         this.api = instance.exports as unknown as Exports;
         this.api._initialize();
-        const colors = new Uint8Array(hello.materials.length * 3);
-        hello.materials.forEach(({ color }, i) => colors.set([color >> 16, (color >> 8) & 255, color & 255], 3 * i));
-        this.fill(colors);
+        const { chunkSide, chunkHeight, materials, meshParts } = hello;
+        const known = new Uint8Array(materials.length * 4);
+        materials.forEach(({ color, kind }, i) => known.set([color >> 16, (color >> 8) & 255, color & 255, kind], 4 * i));
+        this.fill(known);
         this.checked(
-            this.api.room_open(hello.chunkSide, hello.chunkHeight, chunksPerStack(hello, 0), hello.materials.length),
+            this.api.room_open(chunkSide, chunkHeight, chunksPerStack(hello, 0), materials.length, meshParts ? 1 : 0),
         );
     }
 
@@ -255,11 +275,13 @@ export class ColumnRoom {
         const last = heights?.last ?? Math.ceil(this.hello.heightBoundVoxels) + 1;
         const vertices = this.checked(this.api.room_mesh(lod, x, z, MESH_OF[what], first, last));
         const { buffer } = this.api.memory;
+        const partsAt = this.api.mesh_parts();
         return {
             positions: new Float32Array(buffer, this.api.mesh_positions(), vertices * 3).slice(),
             normals: new Float32Array(buffer, this.api.mesh_normals(), vertices * 3).slice(),
             colors: new Uint8Array(buffer, this.api.mesh_colors(), vertices * 3).slice(),
             materials: new Uint8Array(buffer, this.api.mesh_materials(), vertices).slice(),
+            parts: partsAt === 0 ? undefined : new Uint8Array(buffer, partsAt, vertices).slice(),
             indices: new Uint32Array(buffer, this.api.mesh_indices(), this.api.mesh_indices_count()).slice(),
         };
     }

@@ -2,9 +2,10 @@
 import { ChunkStatus } from './generated/terrane/wire/chunk-status.js';
 import { FailureCode } from './generated/terrane/wire/failure-code.js';
 import { Format } from './generated/terrane/wire/format.js';
+import { MaterialKind } from './generated/terrane/wire/material-kind.js';
 import { Source } from './generated/terrane/wire/source.js';
 
-export { ChunkStatus, FailureCode, Format, Source };
+export { ChunkStatus, FailureCode, Format, MaterialKind, Source };
 
 export const PROTOCOL_VERSION = 1;
 
@@ -30,7 +31,10 @@ export interface Material {
     /** sRGB, 0xrrggbb. */
     color: number;
     texture: string;
+    /** One can stand on it. */
     solid: boolean;
+    /** A kind newer than this client is Regular if it is solid, else Void. */
+    kind: MaterialKind;
 }
 
 export interface Limits {
@@ -60,6 +64,8 @@ export interface ServerHello {
     heightBoundVoxels: number;
     materials: Material[];
     limits: Limits;
+    /** A landscape: its meshes tell ground, caves and water apart. */
+    meshParts: boolean;
 }
 
 /** Microseconds that the server spent on an answer. */

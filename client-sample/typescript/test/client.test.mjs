@@ -12,6 +12,8 @@ import {
     ColumnRoom,
     FailureCode,
     Format,
+    MaterialKind,
+    MeshPart,
     PaletteKind,
     TerraneClient,
     TerraneError,
@@ -20,10 +22,11 @@ import {
     compileColumns,
     keyName,
     mixAt,
+    partOf,
     wantSet,
 } from '../dist/index.js';
 import { connectTcp } from '../dist/tcp.js';
-import { basin, startServer, terrane, terraneClient } from './server.mjs';
+import { basin, canyon, startServer, terrane, terraneClient } from './server.mjs';
 
 let server;
 let client;
@@ -39,12 +42,12 @@ after(async () => {
 });
 
 /** A room with the stacks around (x, z). */
-async function roomAround(x, z, lod = 0) {
-    const room = await ColumnRoom.open(module, client.hello);
+async function roomAround(x, z, lod = 0, own = client) {
+    const room = await ColumnRoom.open(module, own.hello);
     for (let dz = -1; dz <= 1; ++dz) {
         for (let dx = -1; dx <= 1; ++dx) {
             const square = { lod, x: x + dx, z: z + dz };
-            const chunks = await client.requestChunks(chunksOf(square, client.hello), {
+            const chunks = await own.requestChunks(chunksOf(square, own.hello), {
                 format: Format.Columns,
             });
             const complete = chunks.map((chunk) => room.put(chunk));
@@ -65,6 +68,8 @@ test('the greeting names the world', () => {
     assert.match(client.hello.fingerprint, /^[0-9a-f]{32}$/);
     assert.ok(client.hello.materials.some(({ name, color }) => name === 'gold' && color === 0xf6c62c));
     assert.equal(client.hello.materials[0].solid, false);
+    assert.equal(client.hello.materials[0].kind, MaterialKind.Void);
+    assert.equal(client.hello.meshParts, false);
 });
 
 test('a request is answered once a key, in chunks that say what they are', async () => {
@@ -159,11 +164,11 @@ test('columns put together from chunks give the materials of `terrane column`', 
     }
 });
 
-function objOf(key) {
+function objOf(key, port) {
     const folder = mkdtempSync(join(tmpdir(), 'terrane-'));
     try {
         execFileSync(terraneClient, [
-            'get', `--server=127.0.0.1:${server.port}`, `--at=${key.x},${key.y},${key.z}`,
+            'get', `--server=127.0.0.1:${port}`, `--at=${key.x},${key.y},${key.z}`,
             `--lod=${key.lod}`, '--obj', '-o', folder,
         ]);
         const text = readFileSync(join(folder, `${key.lod}_${key.x}_${key.y}_${key.z}.obj`), 'utf8');
@@ -184,39 +189,62 @@ function trianglesOf(corner, indices) {
     return triangles.sort();
 }
 
-test('meshes made of columns are the meshes that the server sends', async () => {
+/** Compares the meshes of stack (x, z) of two levels; gives the triangles by part. */
+async function compareMeshes(own, port, x, z) {
+    const parts = [0, 0, 0];
     for (const lod of [0, 2]) {
-        const room = await roomAround(0, -1, lod);
-        const square = { lod, x: 0, z: -1 };
+        const room = await roomAround(x, z, lod, own);
+        const square = { lod, x, z };
         let compared = 0;
-        for (let y = 0; y < chunksPerStack(client.hello, lod); ++y) {
+        for (let y = 0; y < chunksPerStack(own.hello, lod); ++y) {
             const key = { ...square, y };
-            const chunk = await client.requestChunk(key, Format.Draco);
+            const chunk = await own.requestChunk(key, Format.Draco);
             const heights = lod === 0 ? { first: y * 32, last: (y + 1) * 32 } : undefined;
             const mesh = room.mesh(square, 'surface', heights);
             if (chunk.status !== ChunkStatus.Full) {
                 assert.equal(mesh.indices.length, 0);
                 continue;
             }
-            const lines = objOf(key);
+            const lines = objOf(key, port);
             const obj = lines.filter((line) => line.startsWith('v ')).map((line) => line.split(' ').slice(1, 4).map(Number));
             const faces = lines
                 .filter((line) => line.startsWith('f '))
                 .flatMap((line) => line.trim().split(' ').slice(1).map((part) => parseInt(part, 10) - 1));
             const scale = 2 ** lod;
-            const base = [0, y * 32, -32].map((value, axis) => (axis === 1 ? value : value * scale));
-            const shared = (x, yy, z) => [x, yy, z].map((value) => Math.round(value * 32)).join(',');
+            const base = [x * 32, y * 32, z * 32].map((value, axis) => (axis === 1 ? value : value * scale));
+            const shared = (...place) => place.map((value) => Math.round(value * 32)).join(',');
             const sent = trianglesOf((i) => {
-                const [x, yy, z] = obj[i];
-                return shared((x - base[0]) / scale, yy - base[1], (z - base[2]) / scale);
+                const [vx, vy, vz] = obj[i];
+                return shared((vx - base[0]) / scale, vy - base[1], (vz - base[2]) / scale);
             }, faces);
             const p = mesh.positions;
             const made = trianglesOf((i) => shared(p[3 * i], p[3 * i + 1], p[3 * i + 2]), mesh.indices);
             assert.equal(made.length, sent.length);
             assert.deepEqual(made, sent, `chunk ${keyName(key)}`);
             compared += made.length;
+            made.forEach((_, i) => ++parts[partOf(mesh, i)]);
         }
         assert.ok(compared > 1000, `${compared} triangles`);
+    }
+    return parts;
+}
+
+test('meshes made of columns are the meshes that the server sends', async () => {
+    const parts = await compareMeshes(client, server.port, 0, -1);
+    assert.deepEqual(parts.slice(1), [0, 0], 'this world has neither water nor connected caves');
+});
+
+test('those of a landscape too, with its water and its caves', async () => {
+    const other = await startServer(canyon);
+    const own = await TerraneClient.connect(await connectTcp({ port: other.port }), { name: 'canyon test' });
+    try {
+        assert.equal(own.hello.meshParts, true);
+        assert.ok(own.hello.materials.some(({ kind, solid }) => kind === MaterialKind.Water && !solid));
+        const parts = await compareMeshes(own, other.port, -2, -8);
+        assert.ok(parts[MeshPart.Cave] > 0 && parts[MeshPart.Water] > 0, `triangles by part: ${parts}`);
+    } finally {
+        own.close();
+        await other.stop();
     }
 });
 

@@ -9,16 +9,17 @@ export const root = join(dirname(fileURLToPath(import.meta.url)), '../../..');
 export const terrane = process.env.TERRANE_BIN ?? join(root, 'build/release/bin/terrane');
 export const terraneClient = join(dirname(terrane), 'terrane-client');
 export const basin = join(root, 'generator/worlds/basin.toml');
+export const canyon = join(root, 'generator/worlds/canyon.toml');
 
 if (!existsSync(terrane)) {
     throw new Error(`${terrane} is not built; name it in TERRANE_BIN`);
 }
 
 /** Resolves with its TCP port once it listens. */
-export function startServer(...options) {
+export function startServer(world = basin) {
     const server = spawn(
         terrane,
-        ['serve', '--world', basin, '--store', 'memory', '--tcp', '127.0.0.1:0', '--http', 'none', ...options],
+        ['serve', '--world', world, '--store', 'memory', '--tcp', '127.0.0.1:0', '--http', 'none'],
         { stdio: ['ignore', 'pipe', 'pipe'] },
     );
     return new Promise((resolve, reject) => {

@@ -1,5 +1,6 @@
 #include "client-sample/typescript/wasm/column_room.h"
 
+#include "generator/mesh/mesh_world.h"
 #include "generator/volume/chunk_codec.h"
 
 #include <algorithm>
@@ -38,13 +39,34 @@ void append_part(Limits& column, std::size_t first, std::span<const Limit> part,
     }
 }
 
+/// A chunk over a column's top ends it with a void at its ceiling, which is no limit of the column.
+/// Water is a void of another content: its surface stays.
+void trim_air(Limits& column, std::size_t first, const Palette& palette) {
+    const auto is_air = [&](const PaletteEntry& entry, const PaletteEntry& below) {
+        return entry.kind == PaletteKind::void_ && below.kind == PaletteKind::void_ &&
+               entry.composition == below.composition;
+    };
+    while (column.size() > first + 1 && is_air(palette[column.back().palette_id],
+                                               palette[column[column.size() - 2].palette_id])) {
+        column.pop_back();
+    }
+}
+
+std::vector<Material> plain(std::vector<Material> materials) {
+    for (Material& material : materials) {
+        material.kind = MaterialKind::regular;
+    }
+    return materials;
+}
+
 }  // namespace
 
 ColumnRoom::ColumnRoom(WorldDefinition world, std::int32_t heights_per_stack)
     : world_(std::move(world)),
       heights_per_stack_(heights_per_stack),
       surface_mesher_(world_),
-      tile_mesher_(world_) {}
+      tile_mesher_(world_),
+      inside_mesher_(mesh_world(plain(world_.materials), false)) {}
 
 Result<HeldStack*> ColumnRoom::stack_to_fill(ChunkPos position) {
     const StackPos key = stack_of(position);
@@ -176,6 +198,7 @@ Result<void> ColumnRoom::join(HeldStack& stack) {
                 }
                 append_part(grid.limits, first, part, floor256);
             }
+            trim_air(grid.limits, first, palette_);
             grid.offsets.push_back(static_cast<std::uint32_t>(grid.limits.size()));
         }
     }
@@ -279,7 +302,9 @@ bool ColumnRoom::mesh(Mesh& out, StackPos position, MeshOf what, HeightRange hei
         return false;
     }
     find_tile(tile_, position, what);
-    if (position.lod == 0 || what != MeshOf::surface) {
+    if (what != MeshOf::surface) {
+        inside_mesher_.mesh(out, tile_, heights);
+    } else if (position.lod == 0) {
         surface_mesher_.mesh(out, tile_, heights);
     } else {
         tile_mesher_.mesh(out, tile_, true);

@@ -46,7 +46,8 @@ struct HeldStack {
 
 class ColumnRoom {
   public:
-    /// `heights_per_stack`: chunks that a stack of level 0 has, from y = 0 up.
+    /// `heights_per_stack`: chunks that a stack of level 0 has, from y = 0 up. Of the world its
+    /// grid is read and what mesh_world() takes.
     ColumnRoom(WorldDefinition world, std::int32_t heights_per_stack);
 
     /// Decodes the chunk and keeps it; true if its stack is complete now. Chunks below the ground
@@ -72,7 +73,8 @@ class ColumnRoom {
     std::size_t column_bytes() const;
 
     /// Overwrites `out`; false if the stack is not complete. Level 0: `heights` of surface nets,
-    /// positions relative to heights.first. Levels above: the height field with its skirts.
+    /// positions relative to heights.first. Levels above: the height field with its skirts. The
+    /// surface is the server's, water and parts included; caves and veins have no parts.
     bool mesh(Mesh& out, StackPos position, MeshOf what, HeightRange heights);
 
     /// A column of level 0 from the finest stack that is held there, or empty. From a coarser
@@ -96,6 +98,7 @@ class ColumnRoom {
     std::map<StackPos, HeldStack> stacks_;
     SurfaceNetsMesher surface_mesher_;
     HeightFieldMesher tile_mesher_;
+    SurfaceNetsMesher inside_mesher_;  ///< of caves and veins: knows no water and no parts
     Stack tile_;
 };
 

@@ -3,6 +3,7 @@
 // next call. Numbers of results: -1 is an error, whose message is at room_error().
 #include "client-sample/typescript/wasm/column_room.h"
 #include "client-sample/typescript/wasm/section.h"
+#include "generator/mesh/mesh_world.h"
 
 #include <algorithm>
 #include <cstring>
@@ -59,27 +60,34 @@ TERRANE_EXPORT(room_error) const char* room_error() {
     return room().error.c_str();
 }
 
-/// The buffer holds r, g, b a material.
-TERRANE_EXPORT(room_open) int room_open(int side, int height, int heights, int materials) {
+/// The buffer holds r, g, b and the kind (as on the wire) a material. `mesh_parts` as in the
+/// greeting.
+TERRANE_EXPORT(room_open)
+
+int room_open(int side, int height, int heights, int materials, int mesh_parts) {
     Room& here = room();
     if (side < kChunkSideMin || side > kChunkSideMax || height < kChunkSideMin ||
         height > kChunkSideMax || heights < 1 || heights > kHeightBoundMax || materials < 1 ||
         materials > static_cast<int>(kMaterialsMax) ||
-        here.buffer.size() < std::size_t{3} * static_cast<std::size_t>(materials)) {
+        here.buffer.size() < std::size_t{4} * static_cast<std::size_t>(materials)) {
         return failed({.code = ErrorCode::out_of_range, .message = "columns: no such world"});
     }
-    WorldDefinition world;
-    world.grid.side = side;
-    world.grid.height = height;
+    std::vector<Material> read;
     for (std::size_t i = 0; i < static_cast<std::size_t>(materials); ++i) {
         const auto channel = [&](std::size_t at) {
-            return std::to_integer<std::uint8_t>(here.buffer[3 * i + at]);
+            return std::to_integer<std::uint8_t>(here.buffer[4 * i + at]);
         };
         Material material;
         material.id = static_cast<std::int64_t>(i);
         material.color = {.r = channel(0), .g = channel(1), .b = channel(2)};
-        world.materials.push_back(std::move(material));
+        material.kind = channel(3) <= static_cast<std::uint8_t>(MaterialKind::water)
+                            ? static_cast<MaterialKind>(channel(3))
+                            : MaterialKind::regular;
+        read.push_back(std::move(material));
     }
+    WorldDefinition world = mesh_world(std::move(read), mesh_parts != 0);
+    world.grid.side = side;
+    world.grid.height = height;
     here.columns = std::make_unique<ColumnRoom>(std::move(world), heights);
     return 0;
 }
@@ -165,6 +173,11 @@ TERRANE_EXPORT(mesh_colors) const void* mesh_colors() {
 
 TERRANE_EXPORT(mesh_materials) const void* mesh_materials() {
     return room().mesh.material_ids.data();
+}
+
+/// A MeshPart each; null if all is ground.
+TERRANE_EXPORT(mesh_parts) const void* mesh_parts() {
+    return room().mesh.parts.empty() ? nullptr : room().mesh.parts.data();
 }
 
 TERRANE_EXPORT(mesh_indices) const void* mesh_indices() {

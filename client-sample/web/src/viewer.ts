@@ -12,6 +12,7 @@ import { FIELD_OF_VIEW_DEGREES, Stage } from './scene/stage';
 import { TerrainMaterials } from './scene/terrain_material';
 import { TileSet } from './scene/tile_set';
 import type { Comparison, FromWorker, StreamFigures, ToWorker, WireFormat } from './stream/messages';
+import type { Suggested } from './stream/suggest';
 import { FiguresPanel } from './ui/figures_panel';
 import { MiniMap } from './ui/mini_map';
 import { ProbePanel } from './ui/probe_panel';
@@ -59,6 +60,8 @@ export class Viewer {
     private nextQuery = 1;
     private format: WireFormat = 'draco';
     private url: string;
+    private token: string;
+    private showsCaves: boolean;
     private isProbing = false;
     private hasPlace: boolean;
     private lastFrameMs = performance.now();
@@ -81,7 +84,8 @@ export class Viewer {
         const address = query.get('server') ?? '';
         this.url = webSocketUrl(address, location);
         // First of all: the worker greets the server while this thread makes textures and programs.
-        this.send({ kind: 'connect', url: this.url, token: query.get('token') ?? '' });
+        this.token = query.get('token') ?? '';
+        this.connect();
         this.controls = new Controls(canvas);
         const place = readPlace(location.hash);
         this.hasPlace = place !== undefined;
@@ -91,8 +95,11 @@ export class Viewer {
             this.controls.pitch = place.pitch;
         }
         this.format = query.get('format') === 'columns' ? 'columns' : 'draco';
-        // Every quality wants at least this much: it is under way before the first picture can be drawn.
-        this.sendStream(QUALITIES[0]!.radiusChunks);
+        this.showsCaves = query.get('caves') !== '0';
+        if (this.hasPlace) {
+            // Every quality wants at least this much: it is under way before the first picture can be drawn.
+            this.sendStream(QUALITIES[0]!.radiusChunks);
+        }
         this.stage = new Stage(canvas);
         const hour = Number(query.get('hour'));
         if (hour > 0) {
@@ -103,7 +110,7 @@ export class Viewer {
         document.body.classList.toggle('plain', this.stage.isSoftware);
         this.stage.setQuality(this.quality.now);
         this.materials = new TerrainMaterials(this.stage.textures, this.quality.now.detail);
-        this.shell = new Shell(ui, this.actions(), this.stage.hour, address);
+        this.shell = new Shell(ui, this.actions(), { hour: this.stage.hour, address, token: this.token });
         this.panel = new FiguresPanel(() => this.compare());
         this.map = new MiniMap((x, z) => this.jump(x, undefined, z));
         this.shell.side.append(this.map.root, this.shell.fields, this.panel.root);
@@ -117,6 +124,7 @@ export class Viewer {
         window.addEventListener('hashchange', () => {
             const next = readPlace(location.hash);
             if (next !== undefined) {
+                this.hasPlace = true;
                 Object.assign(this.controls.position, { x: next.x, y: next.y, z: next.z });
                 this.controls.yaw = next.yaw;
                 this.controls.pitch = next.pitch;
@@ -129,6 +137,7 @@ export class Viewer {
     async jump(x: number, y: number | undefined, z: number): Promise<void> {
         const { position } = this.controls;
         this.controls.stop();
+        this.hasPlace ||= this.world !== undefined;
         if (this.controls.mode === 'walk') {
             this.controls.setMode('fly');
         }
@@ -142,6 +151,24 @@ export class Viewer {
         }
         Object.assign(position, { x, y: height, z });
         this.needsFrame = true;
+    }
+
+    /** Goes to the place that was found for a URL without one; if none was, to the middle. */
+    private async begin(place: Suggested | undefined): Promise<void> {
+        if (this.hasPlace) {
+            return;
+        }
+        if (place === undefined) {
+            await this.jump(0, undefined, 0);
+        } else {
+            const { x, y, z, yaw, pitch } = place;
+            Object.assign(this.controls.position, { x, y, z });
+            this.controls.yaw = yaw;
+            this.controls.pitch = pitch;
+        }
+        this.hasPlace = true;
+        this.needsFrame = true;
+        this.sendView();
     }
 
     queryColumn(x: number, z: number): Promise<Column> {
@@ -249,6 +276,8 @@ export class Viewer {
                 return undefined;
             },
             server: (address: string) => this.switchServer(address),
+            token: (token: string) => this.useToken(token),
+            caves: () => this.toggleCaves(),
         };
     }
 
@@ -314,7 +343,7 @@ export class Viewer {
         const onCut = this.cutHit(x, y);
         let world = onCut;
         if (world === undefined) {
-            const planes = this.materials.all[0]!.clippingPlanes ?? [];
+            const planes = this.materials.clip;
             const hit = caster.intersectObjects(tiles.shownMeshes(3), false)
                 .find(({ point }) => planes.every((plane) => plane.distanceToPoint(point) >= 0));
             world = hit && { x: hit.point.x + tiles.origin.x, y: hit.point.y, z: hit.point.z + tiles.origin.z };
@@ -356,7 +385,26 @@ export class Viewer {
         history.replaceState(null, '', page);
         this.hasPlace = false;
         this.shell.setState(false, 'connecting…');
-        this.send({ kind: 'connect', url: this.url, token: page.searchParams.get('token') ?? '' });
+        this.connect();
+    }
+
+    private connect(): void {
+        this.send({ kind: 'connect', url: this.url, token: this.token });
+    }
+
+    /** The token stays in the page: an address is copied and logged. */
+    private useToken(token: string): void {
+        this.token = token;
+        this.shell.setState(false, 'connecting…');
+        this.connect();
+    }
+
+    private toggleCaves(): void {
+        this.showsCaves = !this.showsCaves;
+        this.world?.tiles.setCaves(this.showsCaves);
+        this.shell.say(this.showsCaves ? 'caves are drawn' : 'caves are left out: what is under much rock');
+        this.stage.shadowsChanged();
+        this.needsFrame = true;
     }
 
     /** Streams a field that nobody has seen in both formats and measures them. */
@@ -387,6 +435,9 @@ export class Viewer {
             case 'closed':
                 this.shell.setState(false, `${message.reason}; trying again`);
                 this.shell.say(`no connection: ${message.reason}`, true, 0);
+                if (/token/i.test(message.reason)) {
+                    this.shell.askToken();
+                }
                 break;
             case 'tile':
                 this.times.firstTile ||= message.mesh === null ? 0 : performance.now();
@@ -416,6 +467,9 @@ export class Viewer {
                 }
                 break;
             }
+            case 'suggested':
+                void this.begin(message.place);
+                break;
             case 'figures':
                 this.showFigures(message.figures);
                 break;
@@ -430,7 +484,7 @@ export class Viewer {
         this.times.hello ||= performance.now();
         this.shell.say('');
         this.shell.setWorld(hello.worldName, `Terrane ${hello.serverVersion} · ${hello.materials.length} materials`);
-        this.map.setWorld(`${httpBase(this.url)}/v1/w/${hello.contentId}/map`);
+        this.map.setWorld(`${httpBase(this.url)}/v1/w/${hello.contentId}/map`, this.token);
         if (isNewWorld || this.world === undefined) {
             this.openWorld(hello);
         }
@@ -460,10 +514,10 @@ export class Viewer {
         scene.add(tiles.group, cut.group, xray.group);
         this.world = { hello, tiles, ground, cut, xray, probe };
         this.controls.ground = ground;
+        tiles.setCaves(this.showsCaves);
         if (!this.hasPlace) {
-            this.hasPlace = true;
-            Object.assign(this.controls.position, { x: 0, z: 0 });
-            void this.jump(0, undefined, 0);
+            const { x, z } = this.stage.sunDirection;
+            this.send({ kind: 'suggest', sunYaw: Math.atan2(x, z) });
         }
     }
 
@@ -484,7 +538,7 @@ export class Viewer {
     }
 
     private sendView(): void {
-        if (this.world === undefined) {
+        if (this.world === undefined || !this.hasPlace) {
             return;
         }
         const { position } = this.controls;
@@ -575,7 +629,7 @@ export class Viewer {
             this.lastViewMs = now;
             this.sendView();
         }
-        if (now - this.lastPlaceMs > PLACE_PERIOD_MS && this.world !== undefined) {
+        if (now - this.lastPlaceMs > PLACE_PERIOD_MS && this.world !== undefined && this.hasPlace) {
             this.lastPlaceMs = now;
             const hash = writePlace({ ...position, yaw, pitch });
             if (hash !== location.hash) {

@@ -2,6 +2,9 @@
 // starting the page is what costs most where the processor draws.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 
 import { demo, go, look, openViewer, settle, startBrowser, startServer, terrane, until } from './harness.mjs';
@@ -11,6 +14,7 @@ const FLIGHT_SECONDS = Number(process.env.TERRANE_FLIGHT_SECONDS ?? 8);
 const FLIGHT_SPEED = 40;
 
 const OVER_CANYON = '#-60.0,150.0,60.0,-1.6,-0.25';
+const OVER_RIVER = '#-40.0,140.0,-270.0,0.2,-0.7';
 const NEAR_GROUND = '#16.0,130.0,-90.0,0.6,-0.35';
 /** Blends can be thinner than a voxel: heights are tried this finely. */
 const HEIGHT_STEP = 1 / 64;
@@ -265,6 +269,66 @@ test('columns in place of Draco give the same ground', async () => {
     noFaults();
 });
 
+/** Triangles of caves and of water in the tiles around the viewer, by name; those at a rim may differ. */
+function partsAround() {
+    const { world, controls } = window.terrane;
+    const side = world.hello.chunkSide;
+    const [cx, cz] = [controls.position.x, controls.position.z].map((value) => Math.floor(value / side));
+    const found = {};
+    for (const { square, name, mesh, isShown } of world.tiles.tiles.values()) {
+        if (isShown && square.lod === 0 && Math.max(Math.abs(square.x - cx), Math.abs(square.z - cz)) <= 1) {
+            const water = mesh.children.reduce((sum, { geometry }) => sum + geometry.index.count / 3, 0);
+            found[name] = { caves: (mesh.geometry.index.count - mesh.userData.cavesFirst) / 3, water };
+        }
+    }
+    return found;
+}
+
+test('both formats have the same water and the same caves', async () => {
+    await go(page, OVER_RIVER);
+    const draco = await page.evaluate(partsAround);
+    const ofDraco = await look(page, 'river-draco');
+    await page.evaluate(() => {
+        window.terrane.setFormat('columns');
+        window.terrane.figures = undefined;
+    });
+    await until(page, () => window.terrane.figures?.formats.columns.chunks > 20);
+    await settle(page);
+    // Tiles may be made anew for neighbours that came late.
+    await until(page, () => window.terrane.figures?.decodeQueue === 0);
+    await settle(page);
+    const columns = await page.evaluate(partsAround);
+    const ofColumns = await look(page, 'river-columns');
+    assert.deepEqual(columns, draco);
+    assert.equal(Object.keys(draco).length, 9);
+    const sum = (part) => Object.values(draco).reduce((total, counts) => total + counts[part], 0);
+    assert.ok(sum('water') > 100 && sum('caves') > 100, JSON.stringify(draco));
+    let differing = 0;
+    for (let y = 100; y < 400; y += 4) {
+        for (let x = 300; x < 540; x += 4) {
+            const other = ofColumns.at(x, y);
+            differing += ofDraco.at(x, y).some((value, i) => Math.abs(value - other[i]) > 24) ? 1 : 0;
+        }
+    }
+    assert.ok(differing < 75 * 60 * 0.05, `${differing} of ${75 * 60} pixels differ`);
+    await page.evaluate(() => window.terrane.setFormat('draco'));
+    noFaults();
+});
+
+test('caves can be left out', async () => {
+    const drawn = () => page.evaluate(() => [...window.terrane.world.tiles.tiles.values()]
+        .filter(({ mesh }) => mesh !== null)
+        .reduce((sum, { mesh }) => sum + Math.min(mesh.geometry.drawRange.count, mesh.geometry.index.count), 0));
+    await settle(page);
+    const all = await drawn();
+    await page.keyboard.press('v');
+    assert.ok((await drawn()) < all);
+    await page.keyboard.press('v');
+    assert.equal(await drawn(), all);
+    await go(page, NEAR_GROUND);
+    noFaults();
+});
+
 test('walking stands on the ground', async () => {
     // Where the processor draws a fall from the sky takes minutes.
     await until(page, () => {
@@ -301,6 +365,32 @@ test('the place is in the URL', async () => {
     await page.getByLabel('go to').press('Enter');
     await until(page, () => /^#1200\.0,[0-9.]+,-300\.0,-?[0-9.]+,-[0-9.]+$/.test(location.hash));
     noFaults();
+});
+
+test('a token goes into its field, and without a place the view has water and relief', async () => {
+    const folder = mkdtempSync(join(tmpdir(), 'terrane-tokens-'));
+    const file = join(folder, 'tokens.toml');
+    const token = execFileSync(terrane, ['token', 'new', 'visitor', '--file', file]).toString().trim().split(/\s+/).at(-1);
+    const guarded = await startServer({ options: ['--store', 'memory', '--tokens', file] });
+    const { page: other } = await openViewer(browser, guarded.port);
+    try {
+        await until(other, () => document.activeElement?.getAttribute('aria-label') === 'token');
+        assert.equal(await other.evaluate(() => location.hash), '');
+        await other.getByLabel('token').fill(token);
+        await other.getByLabel('token').press('Enter');
+        await until(other, () => document.querySelector('.dot').classList.contains('on') && location.hash !== '');
+        assert.ok(!(await other.evaluate(() => location.href)).includes(token), 'the address keeps no token');
+        const place = await other.evaluate(() => ({ ...window.terrane.controls.position }));
+        assert.ok(Math.hypot(place.x, place.z) < 1024, JSON.stringify(place));
+        await until(other, () => window.terrane.figures?.tilesWanted > 0 && window.terrane.figures.nearMissing === 0);
+        const wet = await other.evaluate(() => [...window.terrane.world.tiles.tiles.values()]
+            .filter(({ mesh, square }) => square.lod <= 2 && mesh?.children.length > 0).length);
+        assert.ok(wet > 3, `${wet} tiles near have water`);
+    } finally {
+        await other.close();
+        await guarded.stop();
+        rmSync(folder, { recursive: true });
+    }
 });
 
 test('a server that restarts is found again, and the world goes on', async () => {

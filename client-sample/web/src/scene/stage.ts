@@ -46,6 +46,10 @@ export class Stage {
         this.setHour(this.hour);
     }
 
+    get sunDirection(): THREE.Vector3 {
+        return lightUniforms.uSunDirection.value;
+    }
+
     setHour(hour: number): void {
         this.hour = hour;
         setHour(hour);

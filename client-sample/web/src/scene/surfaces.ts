@@ -1,12 +1,10 @@
-// What a material's surface looks like, from its name: the wire tells names and colours only. Unknown
-// names look like rock.
-import type { Material } from 'terrane-client';
+// What a material's surface looks like, from its kind and its name. Unknown names look like rock.
+import { MaterialKind, type Material } from 'terrane-client';
 
-/** Shares of 255: grass, loose soil, gloss, snow. All 0: rock. Gloss and snow both whole: water. */
+/** Shares of 255: grass, loose soil, gloss, snow. All 0: rock. */
 export type Surface = [grass: number, soil: number, gloss: number, snow: number];
 
 const RULES: [RegExp, Surface][] = [
-    [/\b(water|sea|river|lake)\b/i, [0, 0, 255, 255]],
     [/\b(turf|grass|moss|meadow|lawn|prairie|heath|fern|leaf)/i, [255, 40, 0, 0]],
     [/\b(snow|ice|glacier|frost|firn)/i, [0, 0, 60, 255]],
     [/\b(soil|clay|loam|mud|peat|silt|dirt|humus|earth|sand|dune|gravel|ash|till|scree)\b/i, [0, 255, 0, 0]],
@@ -16,6 +14,12 @@ const RULES: [RegExp, Surface][] = [
     [/\b(coal|anthracite|slate|shale)/i, [0, 0, 70, 0]],
 ];
 
-export function surfaceOf(material: Material): Surface {
-    return RULES.find(([name]) => name.test(material.name))?.[1] ?? [0, 0, 0, 0];
+const KINDS: Partial<Record<MaterialKind, Surface>> = {
+    [MaterialKind.Soil]: [0, 255, 0, 0],
+    [MaterialKind.Sand]: [0, 255, 0, 0],
+    [MaterialKind.Snow]: [0, 0, 60, 255],
+};
+
+export function surfaceOf({ name, kind }: Material): Surface {
+    return RULES.find(([names]) => names.test(name))?.[1] ?? KINDS[kind] ?? [0, 0, 0, 0];
 }

@@ -8,6 +8,7 @@ import * as THREE from 'three';
 
 import { AIR_GLSL, lightUniforms } from './light';
 import type { DetailTextures } from './noise_texture';
+import { WATER_FRAGMENT, WATER_SIDES, WATER_VERTEX } from './water_material';
 
 export const FADE_STEPS = 8;
 
@@ -113,8 +114,7 @@ void main() {
     vec3 point = vWorld + uOriginPart;
     float grass = vSurface.x * smoothstep(0.45, 0.8, normal.y);
     float soil = vSurface.y;
-    float water = step(0.9, min(vSurface.z, vSurface.w));
-    float gloss = vSurface.z * (1.0 - water);
+    float gloss = vSurface.z;
     float rock = clamp(1.0 - vSurface.x - soil - vSurface.w, 0.0, 1.0);
 
     Ground near = groundAt(point, weight, 1.0 / 8.0);
@@ -147,10 +147,8 @@ void main() {
     float slope = smoothstep(0.86, 0.62, normal.y + (heights.r - 0.5) * 0.22);
     color = mix(color, mix(meadow, bare, slope * 0.8), vSurface.x);
 
-    color = mix(color, vColor * (0.5 + 0.25 * macro), water);
-
 #if DETAIL > 0
-    float bending = mix(1.25, 0.8, soil) * (1.0 - 0.45 * grass) * mix(0.2, 1.0, near_share) * (1.0 - 0.9 * water);
+    float bending = mix(1.25, 0.8, soil) * (1.0 - 0.45 * grass) * mix(0.2, 1.0, near_share);
     bend -= normal * dot(bend, normal);
     normal = normalize(normal - bend * bending * 1.5);
     float hollow = mix(1.0, smoothstep(-0.1, 0.55, relief), 0.65 * mix(0.3, 1.0, near_share));
@@ -171,10 +169,6 @@ void main() {
     float glint = gloss * (0.35 + 0.9 * smoothstep(0.55, 0.95, relief));
     shown += uSunColor * shine * mix(vec3(0.035), color * 1.5 + 0.08, gloss) * (0.25 + glint);
     shown += gloss * skyColor(reflect(-eye, normal)) * color * 0.22;
-    // Water mirrors the sky, more so the flatter one looks at it.
-    float mirror = water * (0.04 + 0.96 * pow(1.0 - max(dot(eye, normal), 0.0), 5.0));
-    shown = mix(shown, skyColor(reflect(-eye, normal)), mirror);
-    shown += water * uSunColor * shadow * pow(max(dot(normal, halfway), 0.0), 160.0);
     // Blades of grass let light through from behind.
     shown += grass * uSunColor * shadow * color * 0.10 * pow(max(dot(-eye, uSunDirection), 0.0), 3.0);
 
@@ -190,35 +184,13 @@ void main() {
 }
 `;
 
-export class TerrainMaterials {
-    /** By fade: [0] is the whole tile; 1..FADE_STEPS-1 comes in; below it, goes out. */
+/** A look in steps of fading in and out. */
+class Fading {
     private readonly shown: THREE.ShaderMaterial;
     private readonly coming: THREE.ShaderMaterial[] = [];
     private readonly leaving: THREE.ShaderMaterial[] = [];
-    readonly originPart = { value: new THREE.Vector3() };
-    private readonly ghost = { value: 0 };
 
-    constructor(textures: DetailTextures, detail: Detail) {
-        const make = (fade: number) => {
-            const material = new THREE.ShaderMaterial({
-                vertexShader: VERTEX,
-                fragmentShader: FRAGMENT,
-                uniforms: {
-                    ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights),
-                    ...lightUniforms,
-                    uHeights: { value: textures.heights },
-                    uSlopes: { value: textures.slopes },
-                    uOriginPart: this.originPart,
-                    uFade: { value: fade },
-                    uGhost: this.ghost,
-                },
-                defines: { DETAIL: detail },
-                lights: true,
-                clipping: true,
-            });
-            material.shadowSide = THREE.DoubleSide;
-            return material;
-        };
+    constructor(make: (fade: number) => THREE.ShaderMaterial) {
         this.shown = make(1);
         for (let i = 1; i < FADE_STEPS; ++i) {
             this.coming.push(make(i / FADE_STEPS));
@@ -238,6 +210,46 @@ export class TerrainMaterials {
         }
         return step >= FADE_STEPS ? this.shown : this.coming[Math.max(step, 1) - 1]!;
     }
+}
+
+export class TerrainMaterials {
+    readonly ground: Fading;
+    readonly water: Fading;
+    readonly originPart = { value: new THREE.Vector3() };
+    private readonly ghost = { value: 0 };
+
+    constructor(textures: DetailTextures, detail: Detail) {
+        const uniforms = (fade: number) => ({
+            ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights),
+            ...lightUniforms,
+            uHeights: { value: textures.heights },
+            uSlopes: { value: textures.slopes },
+            uOriginPart: this.originPart,
+            uFade: { value: fade },
+            uGhost: this.ghost,
+        });
+        const common = { defines: { DETAIL: detail }, lights: true, clipping: true };
+        this.ground = new Fading((fade) => {
+            const material = new THREE.ShaderMaterial({
+                ...common, defines: { ...common.defines }, vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: uniforms(fade),
+            });
+            material.shadowSide = THREE.DoubleSide;
+            return material;
+        });
+        this.water = new Fading((fade) =>
+            new THREE.ShaderMaterial({
+                ...common, ...WATER_SIDES, defines: { ...common.defines },
+                vertexShader: WATER_VERTEX, fragmentShader: WATER_FRAGMENT, uniforms: uniforms(fade),
+            }),
+        );
+    }
+
+    /** Planes that cut the world open now. */
+    clip: THREE.Plane[] = [];
+
+    private get all(): THREE.ShaderMaterial[] {
+        return [...this.ground.all, ...this.water.all];
+    }
 
     setDetail(detail: Detail): void {
         for (const material of this.all) {
@@ -247,18 +259,25 @@ export class TerrainMaterials {
     }
 
     setClip(planes: THREE.Plane[]): void {
+        this.clip = planes;
         for (const material of this.all) {
             const differs = (material.clippingPlanes?.length ?? 0) !== planes.length;
             material.clippingPlanes = planes.length > 0 ? planes : null;
-            material.side = planes.length > 0 ? THREE.DoubleSide : THREE.FrontSide;
             material.needsUpdate ||= differs;
+        }
+        for (const material of this.ground.all) {
+            material.side = planes.length > 0 ? THREE.DoubleSide : THREE.FrontSide;
         }
     }
 
     setGhost(share: number): void {
         this.ghost.value = share;
         const isGhost = share > 0;
-        for (const material of this.all) {
+        // Rivers are hollows too: the X-ray shows them.
+        for (const material of this.water.all) {
+            material.visible = !isGhost;
+        }
+        for (const material of this.ground.all) {
             if (material.transparent !== isGhost) {
                 material.transparent = isGhost;
                 material.depthWrite = !isGhost;

@@ -33,6 +33,7 @@ export class TileSet {
     private leaves = new Set<string>();
     private inner = new Set<string>();
     private roots: Square[] = [];
+    private showsCaves = true;
     private isDirty = true;
     private isFading = false;
     private clock = 0;
@@ -82,9 +83,17 @@ export class TileSet {
         tile.bytes = mesh === null ? 0 : mesh.positions.byteLength + mesh.indices.byteLength + 12 * (mesh.positions.length / 3);
         this.tiles.set(name, tile);
         if (tile.isShown && tile.mesh !== null) {
+            // Made again, it looks as it did.
+            this.dress(tile, tile.fade, false);
             tile.mesh.visible = true;
         }
         this.isDirty = true;
+    }
+
+    /** What lies under much rock can be left out: nobody above the ground sees it. */
+    setCaves(areShown: boolean): void {
+        this.showsCaves = areShown;
+        this.tiles.forEach(({ mesh }) => mesh !== null && this.drawCaves(mesh));
     }
 
     /** Every frame. Gives whether anything changed. */
@@ -147,24 +156,53 @@ export class TileSet {
         return false;
     }
 
-    private makeMesh(square: Square, { positions, normals, colors, surfaces, indices, lowest, highest }: TileMesh): THREE.Mesh {
-        const geometry = new THREE.BufferGeometry();
-        geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
-        geometry.setAttribute('normal', new THREE.BufferAttribute(normals, 4, true));
-        geometry.setAttribute('tint', new THREE.BufferAttribute(colors, 4, true));
-        geometry.setAttribute('surface', new THREE.BufferAttribute(surfaces, 4, true));
-        geometry.setIndex(new THREE.BufferAttribute(indices, 1));
+    private dress({ mesh }: Tile, share: number, isLeaving: boolean): void {
+        if (mesh !== null) {
+            mesh.material = this.materials.ground.at(share, isLeaving);
+            for (const water of mesh.children as THREE.Mesh[]) {
+                water.material = this.materials.water.at(share, isLeaving);
+            }
+        }
+    }
+
+    private drawCaves(mesh: THREE.Mesh): void {
+        mesh.geometry.setDrawRange(0, this.showsCaves ? Infinity : (mesh.userData.cavesFirst as number));
+    }
+
+    /** The ground, with the water as its child. Both have the same vertices. */
+    private makeMesh(square: Square, tile: TileMesh): THREE.Mesh {
+        const attributes = {
+            position: new THREE.BufferAttribute(tile.positions, 3),
+            normal: new THREE.BufferAttribute(tile.normals, 4, true),
+            tint: new THREE.BufferAttribute(tile.colors, 4, true),
+            surface: new THREE.BufferAttribute(tile.surfaces, 4, true),
+        };
+        const { lowest, highest, indices, waterFirst } = tile;
         const middle = this.chunkSide / 2;
         const half = (highest - lowest) / 2;
-        geometry.boundingBox = new THREE.Box3(
-            new THREE.Vector3(0, lowest, 0),
-            new THREE.Vector3(this.chunkSide, highest, this.chunkSide),
-        );
-        geometry.boundingSphere = new THREE.Sphere(
-            new THREE.Vector3(middle, lowest + half, middle),
-            Math.hypot(middle, half, middle) + 1,
-        );
-        const mesh = new THREE.Mesh(geometry, this.materials.at(0, false));
+        const geometryOf = (part: Uint16Array | Uint32Array) => {
+            const geometry = new THREE.BufferGeometry();
+            Object.entries(attributes).forEach(([name, attribute]) => geometry.setAttribute(name, attribute));
+            geometry.setIndex(new THREE.BufferAttribute(part, 1));
+            geometry.boundingBox = new THREE.Box3(
+                new THREE.Vector3(0, lowest, 0),
+                new THREE.Vector3(this.chunkSide, highest, this.chunkSide),
+            );
+            geometry.boundingSphere = new THREE.Sphere(
+                new THREE.Vector3(middle, lowest + half, middle),
+                Math.hypot(middle, half, middle) + 1,
+            );
+            return geometry;
+        };
+        const mesh = new THREE.Mesh(geometryOf(indices.subarray(0, waterFirst)), this.materials.ground.at(0, false));
+        if (waterFirst < indices.length) {
+            const water = new THREE.Mesh(geometryOf(indices.subarray(waterFirst)), this.materials.water.at(0, false));
+            water.receiveShadow = true;
+            water.matrixAutoUpdate = false;
+            mesh.add(water);
+        }
+        mesh.userData.cavesFirst = tile.cavesFirst;
+        this.drawCaves(mesh);
         const scale = 2 ** square.lod;
         mesh.scale.set(scale, 1, scale);
         mesh.castShadow = square.lod <= 1;
@@ -187,6 +225,7 @@ export class TileSet {
         if (tile.mesh !== null) {
             this.group.remove(tile.mesh);
             tile.mesh.geometry.dispose();
+            (tile.mesh.children as THREE.Mesh[]).forEach(({ geometry }) => geometry.dispose());
             tile.mesh = null;
         }
     }
@@ -223,9 +262,7 @@ export class TileSet {
                 if (isShown && tile.fade === 0 && !covered(tile.square)) {
                     // Over nothing it appears at once: a fade would show holes.
                     tile.fade = 1;
-                    if (tile.mesh !== null) {
-                        tile.mesh.material = this.materials.at(1, false);
-                    }
+                    this.dress(tile, 1, false);
                 }
             }
         }
@@ -320,9 +357,7 @@ export class TileSet {
             this.isDirty ||= tile.fade === 0;
             if (tile.mesh !== null) {
                 tile.mesh.visible = tile.fade > 0;
-                tile.mesh.material = tile.isShown
-                    ? this.materials.at(tile.fade, false)
-                    : this.materials.at(1 - tile.fade, true);
+                this.dress(tile, tile.isShown ? tile.fade : 1 - tile.fade, !tile.isShown);
             }
         }
     }

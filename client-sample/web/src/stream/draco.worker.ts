@@ -12,6 +12,8 @@ export interface DracoMesh {
     normals: Float32Array;
     colors: Uint8Array;
     materials: Uint8Array;
+    /** What each vertex is of (MeshPart); undefined: all ground. */
+    parts: Uint8Array | undefined;
     indices: Uint32Array;
 }
 
@@ -44,11 +46,16 @@ const decoder: Promise<Draco> = (async () => {
     return make({ wasmBinary });
 })();
 
-function attribute<T extends Float32Array | Uint8Array>(
-    draco: Draco, reader: any, mesh: any, kind: number, components: number, make: new (length: number) => T,
+/** The mesh's attributes of a kind, in their order. */
+function attributesOf(reader: any, mesh: any, kind: number): any[] {
+    return Array.from({ length: mesh.num_attributes() as number }, (_, i) => reader.GetAttribute(mesh, i))
+        .filter((one) => one.attribute_type() === kind);
+}
+
+function valuesOf<T extends Float32Array | Uint8Array>(
+    draco: Draco, reader: any, mesh: any, attribute: any, components: number, make: new (length: number) => T,
 ): T {
-    const id = reader.GetAttributeId(mesh, kind);
-    if (id < 0) {
+    if (attribute === undefined) {
         throw new Error('draco: an attribute is missing');
     }
     const isFloat = (make as unknown) === Float32Array;
@@ -56,7 +63,7 @@ function attribute<T extends Float32Array | Uint8Array>(
     const at = draco._malloc(values.byteLength);
     try {
         const type = isFloat ? draco.DT_FLOAT32 : draco.DT_UINT8;
-        if (!reader.GetAttributeDataArrayForAllPoints(mesh, reader.GetAttribute(mesh, id), type, values.byteLength, at)) {
+        if (!reader.GetAttributeDataArrayForAllPoints(mesh, attribute, type, values.byteLength, at)) {
             throw new Error('draco: an attribute cannot be read');
         }
         const heap = isFloat ? draco.HEAPF32 : draco.HEAPU8;
@@ -84,11 +91,14 @@ function decode(draco: Draco, payload: Uint8Array): DracoMesh {
         reader.GetTrianglesUInt32Array(mesh, count * 4, at);
         indices.set(draco.HEAPU32.subarray(at / 4, at / 4 + count));
         draco._free(at);
+        const [materials, parts] = attributesOf(reader, mesh, draco.GENERIC);
+        const first = (kind: number) => attributesOf(reader, mesh, kind)[0];
         return {
-            positions: attribute(draco, reader, mesh, draco.POSITION, 3, Float32Array),
-            normals: attribute(draco, reader, mesh, draco.NORMAL, 3, Float32Array),
-            colors: attribute(draco, reader, mesh, draco.COLOR, 3, Uint8Array),
-            materials: attribute(draco, reader, mesh, draco.GENERIC, 1, Uint8Array),
+            positions: valuesOf(draco, reader, mesh, first(draco.POSITION), 3, Float32Array),
+            normals: valuesOf(draco, reader, mesh, first(draco.NORMAL), 3, Float32Array),
+            colors: valuesOf(draco, reader, mesh, first(draco.COLOR), 3, Uint8Array),
+            materials: valuesOf(draco, reader, mesh, materials, 1, Uint8Array),
+            parts: parts && valuesOf(draco, reader, mesh, parts, 1, Uint8Array),
             indices,
         };
     } finally {
@@ -106,6 +116,9 @@ self.onmessage = async ({ data }: MessageEvent<DracoJob>) => {
         const mesh = decode(draco, payload);
         const answer: DracoAnswer = { id, mesh, ms: performance.now() - begin };
         const moved = [mesh.positions, mesh.normals, mesh.colors, mesh.materials, mesh.indices];
+        if (mesh.parts !== undefined) {
+            moved.push(mesh.parts);
+        }
         self.postMessage(answer, { transfer: moved.map(({ buffer }) => buffer as ArrayBuffer) });
     } catch (error) {
         self.postMessage({ id, error: (error as Error).message } satisfies DracoAnswer);

@@ -2,6 +2,8 @@
 // and the room of columns; the page holds the picture.
 import type { Column, SectionLine, ServerHello, Square } from 'terrane-client';
 
+import type { Suggested } from './suggest';
+
 /** A tile's geometry, ready for the GPU: positions in columns of the level and voxels. */
 export interface TileMesh {
     positions: Float32Array;
@@ -9,9 +11,13 @@ export interface TileMesh {
     normals: Int8Array;
     /** Four bytes a vertex: linear red, green, blue, main material. */
     colors: Uint8Array;
-    /** Four bytes a vertex: how much grass, soil, gloss, snow (see surfaces.ts). */
+    /** Four bytes a vertex: how much grass, soil, gloss, snow (see surfaces.ts). Of water: how deep it
+     * is, in 1/8 voxel, and three that mean nothing. */
     surfaces: Uint8Array;
+    /** Ground, from `cavesFirst` on caves, from `waterFirst` on water. */
     indices: Uint16Array | Uint32Array;
+    cavesFirst: number;
+    waterFirst: number;
     lowest: number;
     highest: number;
 }
@@ -90,6 +96,7 @@ export type ToWorker =
     | { kind: 'sectionOff' }
     | { kind: 'xray'; squares: Square[] }
     | { kind: 'column'; id: number; x: number; z: number }
+    | { kind: 'suggest'; sunYaw: number }
     | { kind: 'compare'; squares: Square[] };
 
 export interface SectionImage {
@@ -106,5 +113,6 @@ export type FromWorker =
     | { kind: 'section'; id: number; near: SectionImage; far: SectionImage; missing: number }
     | { kind: 'xray'; square: Square; caves: TileMesh | null; veins: TileMesh | null }
     | { kind: 'column'; id: number; column: Column | null; error: string }
+    | { kind: 'suggested'; place: Suggested | undefined }
     | { kind: 'figures'; figures: StreamFigures }
     | { kind: 'comparison'; comparison: Comparison | null; error: string };

@@ -15,7 +15,8 @@ import { DracoPool } from './draco_pool';
 import { Meter } from './figures';
 import { compareFormats, groundOf, squaresAlong, withoutCover } from './inside';
 import type { FromWorker, SectionImage, ToWorker, ViewState } from './messages';
-import { buffersOf, joinParts, surfacesOf } from './tile_mesh';
+import { bestPlace, heightsAround, type Suggested } from './suggest';
+import { buffersOf, joinPieces, surfacesOf } from './tile_mesh';
 import { TileStream } from './tile_stream';
 
 const FIGURES_PERIOD_MS = 400;
@@ -170,7 +171,7 @@ function sendXray(square: Square): void {
     const [caves, veins] = (['caves', 'veins'] as const).map((what) => {
         const mesh = room.mesh(square, what, heights);
         const indices = what === 'veins' ? withoutCover(mesh, surfaces) : mesh.indices;
-        return joinParts([{ ...mesh, indices, y: heights.first }], surfaces);
+        return joinPieces([{ ...mesh, indices, y: heights.first }], surfaces);
     });
     post({ kind: 'xray', square, caves: caves!, veins: veins! }, [...buffersOf(caves!), ...buffersOf(veins!)]);
 }
@@ -205,6 +206,16 @@ async function sendColumn(id: number, x: number, z: number): Promise<void> {
     } catch (error) {
         post({ kind: 'column', id, column: null, error: session ? (error as Error).message : 'not connected' });
     }
+}
+
+async function suggest(sunYaw: number): Promise<void> {
+    let place: Suggested | undefined;
+    try {
+        place = bestPlace(await heightsAround(session!.client, await columnsModule), sunYaw);
+    } catch {
+        // The page begins somewhere else.
+    }
+    post({ kind: 'suggested', place });
 }
 
 async function compare(squares: Square[]): Promise<void> {
@@ -255,6 +266,9 @@ self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
         }
         case 'column':
             void sendColumn(data.id, data.x, data.z);
+            break;
+        case 'suggest':
+            void suggest(data.sunYaw);
             break;
         case 'compare':
             void compare(data.squares);

@@ -20,7 +20,7 @@ import type { Surface } from '../scene/surfaces';
 import type { DracoPool } from './draco_pool';
 import type { Meter } from './figures';
 import type { TileMesh, ViewState, WireFormat } from './messages';
-import { joinParts, type MeshPart } from './tile_mesh';
+import { joinPieces, type Piece } from './tile_mesh';
 
 const VIEW_PERIOD_MS = 100;
 /** Without views: tiles asked for at a time. */
@@ -33,7 +33,7 @@ interface Tile {
     square: Square;
     since: number;
     missing: Set<number>;
-    parts: MeshPart[];
+    pieces: Piece[];
     isShown: boolean;
     abort: AbortController | undefined;
 }
@@ -143,7 +143,7 @@ export class TileStream {
             names.add(name);
             if (!this.wanted.has(name)) {
                 const isShown = this.shown.has(name);
-                this.wanted.set(name, { square, since: now, missing: this.yOf(square), parts: [], isShown, abort: undefined });
+                this.wanted.set(name, { square, since: now, missing: this.yOf(square), pieces: [], isShown, abort: undefined });
             }
         }
         for (const [name, tile] of this.wanted) {
@@ -241,7 +241,7 @@ export class TileStream {
             const tile = this.wanted.get(squareName(key));
             if (tile !== undefined && !tile.isShown) {
                 tile.missing = this.yOf(tile.square);
-                tile.parts = [];
+                tile.pieces = [];
             }
         }
     }
@@ -263,12 +263,12 @@ export class TileStream {
             const { mesh, ms } = await this.pool.decode(chunk.payload);
             this.meter.decoded('draco', ms, mesh.indices.length / 3);
             if (tile.missing.has(y)) {
-                tile.parts.push({ ...mesh, y: y * this.client.hello.chunkHeight });
+                tile.pieces.push({ ...mesh, y: y * this.client.hello.chunkHeight });
             }
         }
         if (tile.missing.delete(y) && tile.missing.size === 0 && this.isWanted(tile) && this.format === 'draco') {
-            this.show(tile, joinParts(tile.parts, this.surfaces));
-            tile.parts = [];
+            this.show(tile, joinPieces(tile.pieces, this.surfaces));
+            tile.pieces = [];
         }
     }
 
@@ -356,7 +356,7 @@ export class TileStream {
         if (lacks) {
             this.meshedWithout.add(name);
         }
-        this.show(tile, joinParts([{ ...mesh, y: 0 }], this.surfaces));
+        this.show(tile, joinPieces([{ ...mesh, y: 0 }], this.surfaces));
     }
 
     private show(tile: Tile, mesh: TileMesh | null): void {

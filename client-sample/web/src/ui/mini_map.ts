@@ -19,6 +19,7 @@ export class MiniMap {
     private readonly none = element('div', 'none', '');
     private readonly tiles = new Map<string, MapTile>();
     private base = '';
+    private query = '';
     private zoom = DEEPEST - 2;
     private failed = 0;
     private ready = 0;
@@ -49,8 +50,9 @@ export class MiniMap {
     private at = { x: 0, z: 0 };
 
     /** `base`: where W's map tiles are, ending in /map. */
-    setWorld(base: string): void {
+    setWorld(base: string, token: string): void {
         this.base = base;
+        this.query = token === '' ? '' : `?token=${encodeURIComponent(token)}`;
         this.tiles.clear();
         this.failed = this.ready = 0;
         this.shown = '';
@@ -132,7 +134,7 @@ export class MiniMap {
         const tile: MapTile = { image: new Image(), isReady: false, hasFailed: false };
         this.tiles.set(name, tile);
         // fetch, not the image itself: a server without maps is no error of the page.
-        fetch(`${this.base}/${name}.png`)
+        fetch(`${this.base}/${name}.png${this.query}`)
             .then(async (answer) => {
                 if (!answer.ok) {
                     throw new Error(`${answer.status}`);

@@ -1,13 +1,18 @@
 // The probe: one column as a labelled bar, with compositions and heights.
-import type { Column, ColumnLimit, Material, Share } from 'terrane-client';
+import { MaterialKind, type Column, type ColumnLimit, type Material, type Share } from 'terrane-client';
 
 import { element, number } from './dom';
 
-const WIDTH = 232;
 const BAR_X = 34;
 const BAR_WIDTH = 46;
 const LABEL_X = BAR_X + BAR_WIDTH + 12;
-const LABEL_GAP = 24;
+const SWATCH = 8;
+const NAME_HEIGHT = 15;
+const MIX_HEIGHT = 12;
+const MIX_LINES_MAX = 3;
+/** Between two labels, and between two heights. */
+const LABEL_GAP = 3;
+const HEIGHT_GAP = 12;
 const SVG = 'http://www.w3.org/2000/svg';
 
 interface Layer {
@@ -29,7 +34,8 @@ export function layersOf({ limits }: Column, materials: Material[]): Layer[] {
             continue;
         }
         if (same(low, high)) {
-            const isHollow = low.composition.every(({ material }) => materials[material]?.solid === false);
+            const isHollow = low.composition.every(({ material }) =>
+                materials[material]?.solid === false && materials[material]?.kind !== MaterialKind.Water);
             layers.push({ low: low.y256 / 256, high: high.y256 / 256, shares: low.composition, isHollow });
         }
     }
@@ -56,6 +62,28 @@ function svg<K extends keyof SVGElementTagNameMap>(tag: K, attributes: Record<st
     return made;
 }
 
+const FAMILY = getComputedStyle(document.documentElement).fontFamily;
+const NAME_FONT = `11px ${FAMILY}`;
+const MIX_FONT = `10px ${FAMILY}`;
+const pen = document.createElement('canvas').getContext('2d')!;
+
+function widthOf(text: string, font: string): number {
+    pen.font = font;
+    return pen.measureText(text).width;
+}
+
+/** The text, or as much of it as fits and three points. */
+function fitted(text: string, width: number, font: string): string {
+    if (widthOf(text, font) <= width) {
+        return text;
+    }
+    let kept = text.replace(/[ …]+$/, '');
+    while (kept.length > 1 && widthOf(`${kept}…`, font) > width) {
+        kept = kept.slice(0, -1).trimEnd();
+    }
+    return `${kept}…`;
+}
+
 export class ProbePanel {
     readonly root = element('aside', 'glass probe');
     /** What is shown, for tests and for copying. */
@@ -77,15 +105,20 @@ export class ProbePanel {
             return;
         }
         const layers = layersOf(column, this.materials);
-        const top = Math.max(...layers.filter(({ isHollow }) => !isHollow).map(({ high }) => high), 1);
+        const shown = layers.filter(({ isHollow }) => !isHollow);
+        const isWater = ({ shares }: Layer) => this.materials[shares[0]?.material ?? -1]?.kind === MaterialKind.Water;
+        const ground = Math.max(...shown.filter((layer) => !isWater(layer)).map(({ high }) => high), 0);
+        const top = Math.max(...shown.map(({ high }) => high), 1);
         this.title.textContent = `Column ${column.x}, ${column.z}`;
-        this.title.append(element('small', '', `${number(top, 1)} high`));
+        const depth = top > ground ? `, ${number(top - ground, 1)} of water` : '';
+        this.title.append(element('small', '', `${number(ground, 1)} high${depth}`));
         this.frame.replaceChildren(this.draw(layers, top));
     }
 
     private draw(layers: Layer[], top: number): SVGSVGElement {
         const height = Math.max(this.frame.clientHeight, 260);
-        const root = svg('svg', { viewBox: `0 0 ${WIDTH} ${height}`, role: 'img' });
+        const width = Math.max(this.frame.clientWidth, 180);
+        const root = svg('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img' });
         const y = (voxels: number) => height - 8 - (voxels / top) * (height - 16);
         const clip = svg('clipPath', { id: 'probe-bar' });
         clip.append(svg('rect', { x: BAR_X, y: 8, width: BAR_WIDTH, height: height - 16, rx: 6 }));
@@ -101,7 +134,7 @@ export class ProbePanel {
             }
         });
         root.append(bar);
-        this.label(root, visible, y, height);
+        this.label(root, visible, y, { width, height });
         return root;
     }
 
@@ -116,41 +149,66 @@ export class ProbePanel {
     }
 
     /** Names beside the bar, thick layers first, kept apart by moving those in the way. */
-    private label(root: SVGElement, layers: Layer[], y: (voxels: number) => number, height: number): void {
-        const most = Math.floor((height - 16) / LABEL_GAP);
-        const chosen = [...layers]
-            .sort((a, b) => b.high - b.low - (a.high - a.low))
-            .slice(0, most)
-            .sort((a, b) => b.low - a.low);
-        const places = chosen.map(({ low, high }) => (y(low) + y(high)) / 2);
-        for (let round = 0; round < 60; ++round) {
-            for (let i = 0; i < places.length; ++i) {
-                const before = i === 0 ? 14 : places[i - 1]! + LABEL_GAP;
-                places[i] = Math.max(places[i]!, before);
+    private label(root: SVGElement, layers: Layer[], y: (voxels: number) => number, size: { width: number; height: number }): void {
+        const chosen: { layer: Layer; lines: string[]; tall: number }[] = [];
+        let room = size.height;
+        for (const layer of [...layers].sort((a, b) => b.high - b.low - (a.high - a.low))) {
+            const lines = this.linesOf(layer, size.width - LABEL_X - SWATCH - 6);
+            const tall = NAME_HEIGHT + MIX_HEIGHT * (lines.length - 1) + LABEL_GAP;
+            if (tall > room) {
+                break;
             }
-            for (let i = places.length - 1; i >= 0; --i) {
-                const after = i === places.length - 1 ? height - 14 : places[i + 1]! - LABEL_GAP;
-                places[i] = Math.min(places[i]!, after);
+            room -= tall;
+            chosen.push({ layer, lines, tall });
+        }
+        chosen.sort((a, b) => b.layer.low - a.layer.low);
+        // Tops of the labels: each as near to its layer's middle as the others let it.
+        const tops = chosen.map(({ layer, tall }) => (y(layer.low) + y(layer.high) - tall) / 2);
+        for (let round = 0; round < 60; ++round) {
+            tops.forEach((top, i) => (tops[i] = Math.max(top, i === 0 ? 0 : tops[i - 1]! + chosen[i - 1]!.tall)));
+            for (let i = tops.length - 1; i >= 0; --i) {
+                tops[i] = Math.min(tops[i]!, (i === tops.length - 1 ? size.height : tops[i + 1]!) - chosen[i]!.tall);
             }
         }
-        chosen.forEach((layer, i) => {
+        let lastHeight = -Infinity;
+        chosen.forEach(({ layer, lines }, i) => {
+            const at = tops[i]! + NAME_HEIGHT - 4;
             const middle = (y(layer.low) + y(layer.high)) / 2;
-            const at = places[i]!;
-            root.append(svg('path', { d: `M${BAR_X + BAR_WIDTH} ${middle} L${LABEL_X - 3} ${at}`, stroke: 'rgba(255,255,255,0.25)', fill: 'none' }));
-            const names = layer.shares.map(({ material }) => this.materials[material]?.name ?? '?');
-            root.append(svg('text', { x: LABEL_X, y: layer.shares.length > 1 ? at : at + 4 }, names[0]));
-            if (layer.shares.length > 1) {
-                const parts = layer.shares.map(({ concentration }, part) => `${Math.round(concentration * 100)} % ${part === 0 ? '' : names[part]}`.trim());
-                root.append(svg('text', { x: LABEL_X, y: at + 11, class: 'mix' }, parts.join(' · ').slice(0, 34)));
-            }
-            root.append(svg('text', { x: BAR_X - 6, y: y(layer.high) + 4, class: 'height', 'text-anchor': 'end' }, number(layer.high)));
-        });
-        // A swatch of each main material, so that the bar reads as a key too.
-        chosen.forEach((layer, i) => {
+            root.append(svg('path', { d: `M${BAR_X + BAR_WIDTH} ${middle} L${LABEL_X - 3} ${at - 4}`, stroke: 'rgba(255,255,255,0.25)', fill: 'none' }));
+            lines.forEach((line, at_line) =>
+                root.append(svg('text', { x: LABEL_X, y: at + MIX_HEIGHT * at_line, ...(at_line > 0 && { class: 'mix' }) }, line)),
+            );
             const main = layer.shares[0];
             if (main !== undefined) {
-                root.append(svg('rect', { x: WIDTH - 9, y: places[i]! - 4, width: 8, height: 8, rx: 2, fill: css(this.materials[main.material]?.color ?? 0) }));
+                // A swatch of each main material, so that the bar reads as a key too.
+                root.append(svg('rect', { x: size.width - SWATCH - 1, y: at - SWATCH, width: SWATCH, height: SWATCH, rx: 2, fill: css(this.materials[main.material]?.color ?? 0) }));
+            }
+            const heightAt = y(layer.high) + 4;
+            if (heightAt - lastHeight >= HEIGHT_GAP) {
+                lastHeight = heightAt;
+                root.append(svg('text', { x: BAR_X - 6, y: Math.max(heightAt, 9), class: 'height', 'text-anchor': 'end' }, number(layer.high)));
             }
         });
+    }
+
+    /** The name, and under it the shares in as many lines as they take; what does not fit is shortened. */
+    private linesOf({ shares }: Layer, width: number): string[] {
+        const names = shares.map(({ material }) => this.materials[material]?.name ?? '?');
+        const lines = [fitted(names[0] ?? '', width, NAME_FONT)];
+        if (shares.length > 1) {
+            const parts = shares.map(({ concentration }, i) => `${Math.round(concentration * 100)} %${i === 0 ? '' : ` ${names[i]}`}`);
+            for (const part of parts) {
+                const longer = `${lines.at(-1)} · ${part}`;
+                if (lines.length > 1 && widthOf(longer, MIX_FONT) <= width) {
+                    lines[lines.length - 1] = longer;
+                } else if (lines.length <= MIX_LINES_MAX) {
+                    lines.push(fitted(part, width, MIX_FONT));
+                } else {
+                    lines[lines.length - 1] = fitted(`${longer} …`, width, MIX_FONT);
+                    break;
+                }
+            }
+        }
+        return lines;
     }
 }

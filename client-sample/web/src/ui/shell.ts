@@ -13,6 +13,15 @@ export interface ShellActions {
     picture(): void;
     jump(text: string): string | undefined;
     server(address: string): void;
+    token(token: string): void;
+    caves(): void;
+}
+
+/** What stands in the fields at the start. */
+export interface ShellValues {
+    hour: number;
+    address: string;
+    token: string;
 }
 
 const ICONS = {
@@ -40,9 +49,10 @@ export class Shell {
     private readonly flow: HTMLButtonElement;
     private readonly buttons: Record<'mode' | 'cut' | 'xray' | 'probe' | 'format', HTMLButtonElement>;
     private readonly cross = element('div', 'cross');
+    private token: HTMLInputElement | undefined;
     private noteTimer: ReturnType<typeof setTimeout> | undefined;
 
-    constructor(root: HTMLElement, actions: ShellActions, hour: number, address: string) {
+    constructor(root: HTMLElement, actions: ShellActions, values: ShellValues) {
         this.root = root;
         const brand = element('header', 'glass brand');
         brand.innerHTML = LOGO;
@@ -86,13 +96,13 @@ export class Shell {
         this.tools.append(element('span', '', 'drag the face to move the cut'), turn, this.flow);
         this.tools.hidden = true;
         this.note.hidden = true;
-        this.fill(actions, hour, address);
+        this.fill(actions, values);
         root.append(brand, this.side, bar, this.tools, this.note, help, this.cross);
         window.addEventListener('keydown', (event) => {
             const isTyping = (event.target as HTMLElement).tagName === 'INPUT';
             const action = {
                 KeyX: actions.cut, KeyR: actions.xray, KeyP: actions.probe, KeyT: actions.format,
-                KeyO: actions.picture, KeyG: toggle(this.side), KeyH: toggle(help),
+                KeyO: actions.picture, KeyG: toggle(this.side), KeyH: toggle(help), KeyV: actions.caves,
             }[event.code];
             if (!isTyping && !event.repeat && !event.ctrlKey && !event.metaKey) {
                 action?.();
@@ -137,10 +147,19 @@ export class Shell {
         this.root.append(part);
     }
 
-    private fill(actions: ShellActions, hour: number, address: string): void {
-        const field = (label: string, placeholder: string, value: string, enter: (text: string) => string | undefined) => {
+    /** The server wants a token: shows where it goes. */
+    askToken(): void {
+        this.side.hidden = false;
+        this.token?.focus();
+    }
+
+    private fill(actions: ShellActions, { hour, address, token }: ShellValues): void {
+        const field = (
+            label: string, placeholder: string, value: string, enter: (text: string) => string | undefined, type = 'text',
+        ) => {
             const input = element('input');
-            input.type = 'text';
+            input.type = type;
+            input.autocomplete = 'off';
             input.placeholder = placeholder;
             input.value = value;
             input.spellcheck = false;
@@ -156,6 +175,7 @@ export class Shell {
                 }
             });
             fields.append(element('span', '', label), input);
+            return input;
         };
         const fields = element('div', 'fields');
         field('go to', 'x z, or x y z', '', (text) => actions.jump(text));
@@ -163,6 +183,10 @@ export class Shell {
             actions.server(text);
             return undefined;
         });
+        this.token = field('token', 'none', token, (text) => {
+            actions.token(text);
+            return undefined;
+        }, 'password');
         const time = element('input');
         time.type = 'range';
         time.min = '5.4';
@@ -181,7 +205,9 @@ export class Shell {
         help.innerHTML = `<b>Look</b> by dragging, <b>move</b> by keys or the left thumb.
             <dl><dt>W A S D</dt><dd>move; Shift is faster</dd><dt>Space, C</dt><dd>up and down; on foot Space jumps</dd>
             <dt>wheel</dt><dd>speed of flight</dd><dt>F</dt><dd>walk or fly</dd><dt>X</dt><dd>cut the world open</dd>
-            <dt>R</dt><dd>X-ray: caves and veins</dd><dt>P</dt><dd>probe the column you click</dd></dl>`;
+            <dt>R</dt><dd>X-ray: caves and veins</dd><dt>P</dt><dd>probe the column you click</dd>
+            <dt>V</dt><dd>draw caves or leave them out</dd><dt>T</dt><dd>columns or Draco meshes</dd>
+            <dt>O</dt><dd>a picture as a file</dd><dt>G</dt><dd>map, fields and figures</dd><dt>H</dt><dd>this help</dd></dl>`;
         help.hidden = true;
         return help;
     }
