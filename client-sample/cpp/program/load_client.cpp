@@ -144,10 +144,11 @@ void LoadClient::change_wants(const ViewSet& next, Clock::time_point now) {
     if (options_.by_view) {
         return;
     }
-    std::ranges::stable_sort(added, {}, [&](StackPos square) {
+    std::ranges::sort(added, {}, [&](StackPos square) {
         const double side = hello_->chunk_side * std::exp2(square.lod);
-        return std::max(std::abs((square.x + 0.5) * side - place_.x),
-                        std::abs((square.z + 0.5) * side - place_.z));
+        return std::pair(std::max(std::abs((square.x + 0.5) * side - place_.x),
+                                  std::abs((square.z + 0.5) * side - place_.z)),
+                         square);
     });
     std::erase_if(to_ask_, [&](ChunkPos key) { return !view_.contains(stack_of(key)); });
     for (const StackPos square : added) {
