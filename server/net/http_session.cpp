@@ -221,6 +221,15 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     }
     if (auto response = context_.router->handle(received.request, [this] { return later(); })) {
         answer(*std::move(response));
+    } else if (input_ended_) {
+        probe();
+    }
+}
+
+/// Finds out whether a client that sends no more still wants its answer. HTTP/1.0 knows no 1xx.
+void HttpSession::probe() {
+    if (!asked_->is_http_1_0) {
+        outbox_.push(probe_bytes(), nullptr);
     }
 }
 
@@ -335,11 +344,8 @@ void HttpSession::close_with(std::string reason) {
 
 void HttpSession::input_ended() {
     input_ended_ = true;
-    if (asked_ && asked_->is_http_1_0) {  // which knows no 1xx: there is no telling
-        stop_.request_stop();
-        dead_ = true;
-    } else if (asked_) {
-        outbox_.push(probe_bytes(), nullptr);
+    if (asked_) {
+        probe();
     } else if (!wake_at_) {
         process(Clock::now());
     }

@@ -7,8 +7,8 @@
 //
 // A client may say that it sends no more (a half-close): what it has sent is answered, then the
 // connection closes. That looks like a client that has gone, until something is sent to it: so one
-// that waits for an answer is told "100 Continue". Who has gone resets the connection, which ends
-// the session and takes the question back.
+// that waits for an answer is told "100 Continue" (not in HTTP/1.0, which knows no such thing). Who
+// has gone resets the connection, which ends the session and takes the question back.
 //
 // The router makes the answers. One that it gives at once is written in the same step, by gather
 // write: the head is made here, the body is shared with the cache. One that comes later is posted
@@ -126,6 +126,7 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     void keep_to_rates_of(const HttpRequest& request);
     bool takes_request();
     HttpRespond later();
+    void probe();
     void answer(HttpResponse response);
     void log_answer(unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);

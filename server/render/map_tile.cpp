@@ -62,6 +62,7 @@ LinearColor under_water(LinearColor bed, LinearColor water, float depth_voxels) 
 struct Seen {
     float height = 0;
     LinearColor color;
+    bool is_water = false;
 };
 
 /// The ground, or the water that stands over it.
@@ -74,22 +75,27 @@ Seen seen_from_above(std::span<const Limit> column, const Palette& palette,
         const std::uint16_t id = column[i].palette_id;
         const float surface = voxels_of(column[i + 1]);
         if (surface > ground && is_water(palette[id], materials)) {
-            return {.height = surface, .color = under_water(bed, colors[id], surface - ground)};
+            return {.height = surface,
+                    .color = under_water(bed, colors[id], surface - ground),
+                    .is_water = true};
         }
     }
-    return {.height = ground, .color = bed};
+    return {.height = ground, .color = bed, .is_water = false};
 }
 
 /// Rivers narrower than a pixel become as wide as one, or they would be dashes.
+/// Samples that are `wet` show water as it is.
 void draw_rivers(Relief& relief, const Patch& patch, RiverMap& rivers, const ColumnPos& first,
-                 std::int64_t step, LinearColor water) {
+                 std::int64_t step, LinearColor water, std::span<const std::uint8_t> wet) {
     const auto half_pixel = static_cast<float>(step << relief.detail) * 0.5F;
     const RectangleShape shape{
         .x0 = first.x, .z0 = first.z, .width = patch.width, .length = patch.length, .step = step};
     const std::span<const float> distances = rivers.distances(shape, half_pixel);
     for (std::int32_t z = 0; z < patch.length; ++z) {
         for (std::int32_t x = 0; x < patch.width; ++x) {
-            if (distances[static_cast<std::size_t>(z * shape.stride() + x)] < half_pixel) {
+            const bool is_near =
+                distances[static_cast<std::size_t>(z * shape.stride() + x)] < half_pixel;
+            if (is_near && wet[static_cast<std::size_t>(z * patch.width + x)] == 0) {
                 LinearColor& color = relief.colors[relief.index_of(patch.x + x, patch.y + z)];
                 color = under_water(color, water, kRiverDepth);
             }
@@ -107,8 +113,10 @@ std::optional<LinearColor> water_color(const World& world) {
     return std::nullopt;
 }
 
-void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
-                std::span<const Material> materials) {
+/// Overwrites `wet`: 1 for each sample that shows water, row by row.
+void fill_patch(Relief& relief, std::vector<std::uint8_t>& wet, const ColumnSet& set,
+                const Patch& patch, std::span<const Material> materials) {
+    wet.clear();
     const std::vector<LinearColor> colors = palette_colors(set.palette, materials);
     for (std::int32_t z = 0; z < patch.length; ++z) {
         for (std::int32_t x = 0; x < patch.width; ++x) {
@@ -117,6 +125,7 @@ void fill_patch(Relief& relief, const ColumnSet& set, const Patch& patch,
             const std::size_t at = relief.index_of(patch.x + x, patch.y + z);
             relief.heights[at] = seen.height;
             relief.colors[at] = seen.color;
+            wet.push_back(seen.is_water ? 1 : 0);
         }
     }
 }
@@ -132,6 +141,7 @@ Result<void> sample(Relief& relief, const Drawing& drawing, ColumnPos first, std
     relief.heights.resize(count);
     relief.colors.resize(count);
     ColumnSet set;
+    std::vector<std::uint8_t> wet;
     RiverMap rivers(*drawing.world);
     const std::optional<LinearColor> water = water_color(*drawing.world);
     for (std::int32_t y = 0; y < rows; y += kPatchColumns) {
@@ -151,11 +161,11 @@ Result<void> sample(Relief& relief, const Drawing& drawing, ColumnPos first, std
             if (!made) {
                 return made;
             }
-            fill_patch(relief, set, patch, drawing.world->definition.materials);
+            fill_patch(relief, wet, set, patch, drawing.world->definition.materials);
             if (lod > 0 && water) {
                 draw_rivers(relief, patch, rivers,
                             {.x = first.x - apron + x * step, .z = first.z - apron + y * step},
-                            step, *water);
+                            step, *water, wet);
             }
         }
     }

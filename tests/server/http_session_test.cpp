@@ -187,21 +187,30 @@ TEST(HttpSession, AnswersLaterOnItsOwnThreadAndTheNextOneAfterwards) {
 }
 
 TEST(HttpSession, WhoLeavesTakesTheQuestionBack) {
-    for (const bool closes : {false, true}) {
-        Fixture f;
-        f.send(closes ? kChunk : "GET /chunk HTTP/1.0\r\n\r\n");
-        f.gate.begun.acquire();
-        EXPECT_EQ(f.service->in_flight(), 1U);
-        if (closes) {
-            f.session->end();
-        } else {
-            f.session->input_ended();
-        }
-        EXPECT_TRUE(f.session->is_dead());
-        EXPECT_EQ(f.service->in_flight(), 0U);
-        EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
-        f.gate.passes.release();
-    }
+    Fixture f;
+    f.send(kChunk);
+    f.gate.begun.acquire();
+    EXPECT_EQ(f.service->in_flight(), 1U);
+    f.session->end();
+    EXPECT_TRUE(f.session->is_dead());
+    EXPECT_EQ(f.service->in_flight(), 0U);
+    EXPECT_EQ(count_of(f.counters, &OutcomeCounters::cancelled), 1U);
+    f.gate.passes.release();
+}
+
+TEST(HttpSession, AnswersHttp10AfterAHalfCloseAndProbesNothing) {
+    Fixture f;
+    f.send("GET /chunk HTTP/1.0\r\n\r\n");
+    f.gate.begun.acquire();
+    f.session->input_ended();
+    EXPECT_FALSE(f.session->is_closing() || f.session->is_dead());
+    EXPECT_EQ(f.output(), "");
+    f.gate.passes.release();
+    f.run_posted();
+    const std::string out = f.output();
+    EXPECT_TRUE(out.starts_with("HTTP/1.1 200 OK")) << out;
+    EXPECT_TRUE(out.ends_with("payload")) << out;
+    EXPECT_TRUE(f.session->is_closing());
 }
 
 TEST(HttpSession, AnswersAllThatCameBeforeAHalfClose) {

@@ -240,7 +240,8 @@ export class ColumnRoom {
         const pairs = new Float64Array(shares.length * 2);
         shares.forEach((share, i) => pairs.set([share.material, share.concentration], 2 * i));
         this.fill(new Uint8Array(pairs.buffer));
-        const isSolid = shares.some((share) => this.hello.materials[share.material]?.solid ?? true);
+        const main = shares[0];
+        const isSolid = main !== undefined && (this.hello.materials[main.material]?.solid ?? true);
         const kind = isSolid ? PaletteKind.Layer : PaletteKind.Void;
         const { lod, x, y, z } = key;
         return this.checked(this.api.room_put_uniform(lod, x, y, z, kind, shares.length)) === 1;

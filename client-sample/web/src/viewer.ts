@@ -488,6 +488,10 @@ export class Viewer {
         if (isNewWorld || this.world === undefined) {
             this.openWorld(hello);
         }
+        if (!this.hasPlace) {
+            const { x, z } = this.stage.sunDirection;
+            this.send({ kind: 'suggest', sunYaw: Math.atan2(x, z) });
+        }
         this.groundAsked = '';
         this.sendView();
     }
@@ -515,10 +519,6 @@ export class Viewer {
         this.world = { hello, tiles, ground, cut, xray, probe };
         this.controls.ground = ground;
         tiles.setCaves(this.showsCaves);
-        if (!this.hasPlace) {
-            const { x, z } = this.stage.sunDirection;
-            this.send({ kind: 'suggest', sunYaw: Math.atan2(x, z) });
-        }
     }
 
     private showFigures(figures: StreamFigures): void {
