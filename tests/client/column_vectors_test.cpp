@@ -4,8 +4,7 @@
 // hash: FNV-1a, 32 bits, over positions (i32, 1/256), normals (3 x f32), colours (3 x u8), material
 // ids (u8), parts (u8, 0 where there are none) and indices (u32), little endian, one behind the
 // other. A hexadecimal chunk is in the form of CHUNK_FORMAT.md. When meshes are to change,
-// WriteTheFile makes it anew: --gtest_also_run_disabled_tests
-// --gtest_filter='ColumnVectors.DISABLED_WriteTheFile'.
+// the test that compares the file leaves the new one in the folder for temporary files.
 #include "client-sample/cpp/column_map.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/volume/chunk_codec.h"
@@ -19,9 +18,12 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <span>
+#include <sstream>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -169,8 +171,8 @@ void append_chunks(Json& chunks, const Stack& stack, std::int32_t heights, std::
 }
 
 /// Small chunks of `karst` around the first stack that has ground, caves and water, and a tile of
-/// level 2 with water: writes what the test above reads.
-TEST(ColumnVectors, DISABLED_WriteTheFile) {
+/// level 2 with water: what the test above reads.
+TEST(ColumnVectors, TheFileIsWhatTheGeneratorGives) {
     WorldDefinition definition = load_shipped_world("karst")->definition;
     definition.grid.side = 8;
     definition.grid.height = 16;
@@ -233,7 +235,7 @@ TEST(ColumnVectors, DISABLED_WriteTheFile) {
         materials.push_back({{"color", color.r << 16 | color.g << 8 | color.b},
                              {"kind", static_cast<int>(material.kind)}});
     }
-    std::ofstream file(test_data_path("column_meshes.json"));
+    std::ostringstream file;
     file << R"({"world":)"
          << Json{{"chunk_side", definition.grid.side},
                  {"chunk_height", definition.grid.height},
@@ -249,6 +251,13 @@ TEST(ColumnVectors, DISABLED_WriteTheFile) {
         file << (i == 0 ? "\n" : ",\n") << meshes[i];
     }
     file << "]}\n";
+    std::ifstream kept(test_data_path("column_meshes.json"));
+    const std::string text((std::istreambuf_iterator<char>(kept)), {});
+    if (file.str() != text) {
+        const auto path = std::filesystem::temp_directory_path() / "column_meshes.json";
+        std::ofstream(path) << file.str();
+        ADD_FAILURE() << "the file differs; as it would be now: " << path;
+    }
 }
 
 }  // namespace
