@@ -46,8 +46,14 @@ class CollectingReporter : public benchmark::ConsoleReporter {
                           static_cast<double>(run.iterations);
             // Without the repetition count that str() appends.
             const std::string& arguments = run.run_name.args;
-            times_[run.run_name.function_name + (arguments.empty() ? "" : "/" + arguments)]
-                .push_back(seconds);
+            const std::string name =
+                run.run_name.function_name + (arguments.empty() ? "" : "/" + arguments);
+            times_[name].push_back(seconds);
+            for (const auto& [counter, value] : run.counters) {
+                if (const std::size_t unit = counter.rfind("_s"); unit == counter.size() - 2) {
+                    times_[name + ":" + counter.substr(0, unit)].push_back(value.value);
+                }
+            }
         }
         if (!shown.empty()) {
             ConsoleReporter::ReportRuns(shown);
@@ -61,22 +67,44 @@ class CollectingReporter : public benchmark::ConsoleReporter {
     /// Median seconds an item; 0 if the benchmark did not run.
     double median(const std::string& name) const {
         const auto found = times_.find(name);
-        if (found == times_.end()) {
-            return 0;
+        return found == times_.end() ? 0 : median_of(found->second);
+    }
+
+    /// The median of a repetition's own ratio, of two stages of one benchmark; -1 if it did not
+    /// run.
+    double paired_median(const std::string& above, const std::string& below) const {
+        const auto numerators = times_.find(above);
+        const auto denominators = times_.find(below);
+        if (numerators == times_.end() || denominators == times_.end()) {
+            return -1;
         }
-        std::vector<double> sorted = found->second;
-        std::sort(sorted.begin(), sorted.end());
-        return sorted[sorted.size() / 2];
+        std::vector<double> quotients;
+        for (std::size_t i = 0; i < numerators->second.size(); ++i) {
+            quotients.push_back(numerators->second[i] / denominators->second[i]);
+        }
+        return median_of(std::move(quotients));
     }
 
     const std::map<std::string, std::vector<double>>& times() const { return times_; }
 
   private:
+    static double median_of(std::vector<double> values) {
+        std::sort(values.begin(), values.end());
+        return values[values.size() / 2];
+    }
+
     std::map<std::string, std::vector<double>> times_;
 };
 
 /// -1 if one of its benchmarks did not run.
 double value_of(const Ratio& ratio, const CollectingReporter& reporter) {
+    const auto benchmark_of = [](const std::string& name) {
+        return name.substr(0, name.find(':'));
+    };
+    if (ratio.numerators.size() == 1 &&
+        benchmark_of(ratio.numerators[0]) == benchmark_of(ratio.denominator)) {
+        return reporter.paired_median(ratio.numerators[0], ratio.denominator);
+    }
     double sum = 0;
     for (const std::string& name : ratio.numerators) {
         const double median = reporter.median(name);

@@ -68,20 +68,18 @@ struct Chain {
     }
 };
 
-enum class Stage : std::uint8_t { generate, mesh, encode, whole };
-
 double thread_seconds() {
     timespec now{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
     return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// The whole chain over the same stacks whatever stage is timed, so that each finds in the caches
-/// what the one before left there.
-void cold(benchmark::State& state, const std::string& name, Stage stage) {
+/// The whole chain over one stack after another; each stage's seconds a stack are a counter.
+void cold(benchmark::State& state, const std::string& name) {
     Chain chain(name);
     std::int64_t i = 0;
     std::size_t triangles = 0;
+    std::array<double, 3> stages{};  // generate, mesh, encode
     for (auto _ : state) {
         const double begin = thread_seconds();
         chain.generate(i++);
@@ -91,13 +89,18 @@ void cold(benchmark::State& state, const std::string& name, Stage stage) {
         benchmark::DoNotOptimize(chain.encode());
         const double encoded = thread_seconds();
         triangles += chain.mesh.triangle_count();
-        state.SetIterationTime(stage == Stage::generate ? generated - begin
-                               : stage == Stage::mesh   ? meshed - generated
-                               : stage == Stage::encode ? encoded - meshed
-                                                        : encoded - begin);
+        stages[0] += generated - begin;
+        stages[1] += meshed - generated;
+        stages[2] += encoded - meshed;
     }
-    state.counters["triangles"] =
-        static_cast<double>(triangles) / static_cast<double>(state.iterations());
+    const auto a_stack = [&state](double sum) {
+        return sum / static_cast<double>(state.iterations());
+    };
+    state.counters["triangles"] = a_stack(static_cast<double>(triangles));
+    state.counters["generate_s"] = a_stack(stages[0]);
+    state.counters["mesh_s"] = a_stack(stages[1]);
+    state.counters["encode_s"] = a_stack(stages[2]);
+    state.counters["whole_s"] = a_stack(stages[0] + stages[1] + stages[2]);
 }
 
 /// A coarse level's tile: generate, height field with skirts, encode.
@@ -164,10 +167,10 @@ double timed_additions(std::size_t workers) {
     });
 }
 
-/// One worker and two take turns at the same stacks, and one thread and two at additions, whichever
-/// of these is timed: a machine that others use as well is not the same from one second to the
-/// next.
-void workers(benchmark::State& state, bool is_additions) {
+/// One worker and two take turns at the same stacks, and one thread and two at additions: a machine
+/// that others use as well is not the same from one second to the next. The iteration's time is all
+/// four's.
+void workers(benchmark::State& state) {
     const auto chains_of = [](std::size_t count) {
         std::vector<std::unique_ptr<Chain>> chains;
         std::generate_n(std::back_inserter(chains), count,
@@ -180,77 +183,54 @@ void workers(benchmark::State& state, bool is_additions) {
     timed_round(alone, 0);
     timed_round(two, 0);
     std::int64_t round = 1;
+    std::array<double, 4> seconds{};
     for (auto _ : state) {
-        const std::array<double, 4> seconds = {timed_round(alone, round), timed_round(two, round),
-                                               timed_additions(1), timed_additions(2)};
-        const std::int64_t which = state.range(0) - 1 + (is_additions ? 2 : 0);
-        state.SetIterationTime(seconds[static_cast<std::size_t>(which)]);
+        seconds[0] += timed_round(alone, round);
+        seconds[1] += timed_round(two, round);
+        seconds[2] += timed_additions(1);
+        seconds[3] += timed_additions(2);
         ++round;
     }
-}
-
-void register_stages() {
-    for (const std::string world : {"paper-B3", "basin"}) {
-        const auto add = [&world](const std::string& name, Stage stage) {
-            benchmark::RegisterBenchmark(
-                (name + "/" + world).c_str(),
-                [world, stage](benchmark::State& state) { cold(state, world, stage); })
-                ->Iterations(128)
-                ->UseManualTime()
-                ->Unit(benchmark::kMicrosecond);
-        };
-        add("cold_generate", Stage::generate);
-        add("cold_mesh", Stage::mesh);
-        add("cold_encode", Stage::encode);
-        add("cold_whole", Stage::whole);
+    const std::array<const char*, 4> names = {"one_s", "two_s", "additions_one_s", "additions_two_s"};
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        state.counters[names[i]] = seconds[i] / static_cast<double>(state.iterations());
     }
 }
 
-const bool kRegistered = (register_stages(), true);
-
+BENCHMARK_CAPTURE(cold, paper_B3, "paper-B3")->Iterations(128)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(cold, basin, "basin")->Iterations(128)->Unit(benchmark::kMicrosecond);
 BENCHMARK(cold_level)->Arg(1)->Arg(3)->Arg(5)->Arg(9)->Arg(17)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(workers, whole, false)
-    ->Arg(1)
-    ->Arg(2)
-    ->Iterations(4)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(workers, additions, true)
-    ->Arg(1)
-    ->Arg(2)
-    ->Iterations(4)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK(workers)->Iterations(4)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 const RatioEntry kWholePaper{
     {.what = "whole cold mesh (generate, mesh, encode) / Draco's encode alone, paper's B3",
-     .numerators = {"cold_whole/paper-B3"},
-     .denominator = "cold_encode/paper-B3",
+     .numerators = {"cold/paper_B3:whole"},
+     .denominator = "cold/paper_B3:encode",
      .bar = 1.2}};
 const RatioEntry kWholeBasin{{.what = "the same, basin",
-                              .numerators = {"cold_whole/basin"},
-                              .denominator = "cold_encode/basin",
+                              .numerators = {"cold/basin:whole"},
+                              .denominator = "cold/basin:encode",
                               .bar = 1.4}};
 const RatioEntry kLevelsOf[] = {RatioEntry{{.what = "whole cold mesh of level 1 / of level 0",
                                             .numerators = {"cold_level/1"},
-                                            .denominator = "cold_whole/basin",
+                                            .denominator = "cold/basin:whole",
                                             .bar = 1.3}},
                                 RatioEntry{{.what = "whole cold mesh of level 5 / of level 0",
                                             .numerators = {"cold_level/5"},
-                                            .denominator = "cold_whole/basin",
+                                            .denominator = "cold/basin:whole",
                                             .bar = 1.3}},
                                 RatioEntry{{.what = "whole cold mesh of level 17 / of level 0",
                                             .numerators = {"cold_level/17"},
-                                            .denominator = "cold_whole/basin",
+                                            .denominator = "cold/basin:whole",
                                             .bar = 1.3}}};
 const RatioEntry kWorkers{{.what = "two workers / one worker, time for 64 cold meshes",
-                           .numerators = {"workers/whole/2"},
-                           .denominator = "workers/whole/1",
+                           .numerators = {"workers:two"},
+                           .denominator = "workers:one",
                            .bar = 1 / 1.85}};
 const RatioEntry kMachine{
     {.what = "the same of additions in registers: the machine's own two cores",
-     .numerators = {"workers/additions/2"},
-     .denominator = "workers/additions/1",
+     .numerators = {"workers:additions_two"},
+     .denominator = "workers:additions_one",
      .bar = 1 / 1.85}};
 
 }  // namespace

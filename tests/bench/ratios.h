@@ -8,7 +8,9 @@
 namespace terrane::bench {
 
 /// "`numerators` (their mean) take at most `bar` times as long as `denominator`", by medians of
-/// seconds an item. Names are as Google Benchmark prints them.
+/// seconds an item. Names are as Google Benchmark prints them; "name:stage" is the counter
+/// "stage_s" of benchmark "name". Two stages of one benchmark are compared repetition by
+/// repetition: what else the machine did then was done to both.
 struct Ratio {
     std::string what;
     std::vector<std::string> numerators;

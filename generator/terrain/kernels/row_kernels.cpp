@@ -15,33 +15,44 @@ float fade(float t) {
     return t * t * t * (t * (t * 6.0F - 15.0F) + 10.0F);
 }
 
-/// Unit vectors at (i + 1/2) * 22.5 degrees from +x.
-alignas(64) constexpr float kGradientX[16] = {.98078528F,  .83146961F,  .55557023F,  .19509032F,
-                                              -.19509032F, -.55557023F, -.83146961F, -.98078528F,
-                                              -.98078528F, -.83146961F, -.55557023F, -.19509032F,
-                                              .19509032F,  .55557023F,  .83146961F,  .98078528F};
-alignas(64) constexpr float kGradientZ[16] = {.19509032F,  .55557023F,  .83146961F,  .98078528F,
-                                              .98078528F,  .83146961F,  .55557023F,  .19509032F,
-                                              -.19509032F, -.55557023F, -.83146961F, -.98078528F,
-                                              -.98078528F, -.83146961F, -.55557023F, -.19509032F};
+/// cos of (k + 1/2) * 22.5 degrees, of which all sixteen gradients are made.
+constexpr float kCosine0 = .98078528F;
+constexpr float kCosine1 = .83146961F;
+constexpr float kCosine2 = .55557023F;
+constexpr float kCosine3 = .19509032F;
 
+/// mix() of random.h.
+std::uint64_t mixed(std::uint64_t hash) {
+    hash ^= hash >> 30U;
+    hash *= 0xbf58476d1ce4e5b9U;
+    hash ^= hash >> 27U;
+    hash *= 0x94d049bb133111ebU;
+    return hash ^ (hash >> 31U);
+}
+
+/// Unit vectors at (n + 1/2) * 22.5 degrees from +x, n a hash's four highest bits. Folded into an
+/// eighth of the circle and chosen by comparisons: looking them up would be one lane at a time.
+/// Loops over whole rows: within blocks, compilers unroll the hashes into scalars.
 void gradients(float* __restrict x, float* __restrict z,
                const std::uint64_t* __restrict column_hash, std::uint64_t row_value,
                std::int32_t count) {
-    for (std::int32_t first = 0; first < count; first += kBlock) {
-        std::int32_t number[kBlock];
-        for (std::int32_t i = 0; i < kBlock; ++i) {
-            std::uint64_t hash = column_hash[first + i] ^ row_value;  // mix of random.h
-            hash ^= hash >> 30U;
-            hash *= 0xbf58476d1ce4e5b9U;
-            hash ^= hash >> 27U;
-            hash *= 0x94d049bb133111ebU;
-            number[i] = static_cast<std::int32_t>((hash ^ (hash >> 31U)) >> 60U);
-        }
-        for (std::int32_t i = 0; i < kBlock; ++i) {
-            x[first + i] = kGradientX[number[i]];
-            z[first + i] = kGradientZ[number[i]];
-        }
+    std::int32_t number[2 * kRectangleSideMax + 2 * kBlock];
+    const std::int32_t padded = (count + kBlock - 1) / kBlock * kBlock;
+    for (std::int32_t i = 0; i < padded; ++i) {
+        number[i] = static_cast<std::int32_t>(mixed(column_hash[i] ^ row_value) >> 60U);
+    }
+    for (std::int32_t i = 0; i < padded; ++i) {
+        const std::int32_t n = number[i];
+        // The quadrants run back and forth between the axes.
+        const std::int32_t k = ((n & 4) != 0 ? ~n : n) & 3;
+        const float near_x = (k & 1) != 0 ? kCosine1 : kCosine0;
+        const float far_x = (k & 1) != 0 ? kCosine3 : kCosine2;
+        const float near_z = (k & 1) != 0 ? kCosine2 : kCosine3;
+        const float far_z = (k & 1) != 0 ? kCosine0 : kCosine1;
+        const float size_x = (k & 2) != 0 ? far_x : near_x;
+        const float size_z = (k & 2) != 0 ? far_z : near_z;
+        x[i] = ((n + 4) & 8) != 0 ? -size_x : size_x;
+        z[i] = (n & 8) != 0 ? -size_z : size_z;
     }
 }
 
