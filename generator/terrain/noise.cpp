@@ -232,7 +232,7 @@ void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave,
     }
     std::fill(fraction_x + axis.count, fraction_x + row, 0.0F);
     std::fill(fade_x + axis.count, fade_x + row, 0.0F);
-    std::fill(column_cell + axis.count, column_cell + row, 0);
+    std::fill(column_cell + axis.count, column_cell + row, column_cell[axis.count - 1]);
     rows.fraction_x = fraction_x;
     rows.fade_x = fade_x;
     rows.column_cell = column_cell;

@@ -6,6 +6,10 @@
 // Sources: Perlin 2002 (noise); Santamaría-Ibirika et al. 2013, eq. 4 (heights), eq. 6 (elements).
 #include "generator/terrain/kernels/row_kernels.h"
 
+#ifdef __AVX2__
+#include <immintrin.h>  // its functions are always inlined: the rule above holds
+#endif
+
 namespace terrane::TERRANE_KERNEL_SET {
 namespace {
 
@@ -56,10 +60,11 @@ void gradients(float* __restrict x, float* __restrict z,
     }
 }
 
-/// One row of one octave: per lattice column the two lines A + B * f.
+/// One row of one octave: per lattice column the two lines A + B * f; and what a Picker may read
+/// behind them.
 struct LatticeRow {
-    float a[2 * kRectangleSideMax + 2];
-    float b[2 * kRectangleSideMax + 2];
+    float a[2 * kRectangleSideMax + 2 + 2 * kBlock];
+    float b[2 * kRectangleSideMax + 2 + 2 * kBlock];
 };
 
 void fold_gradients(LatticeRow& lattice, const NoiseRows& octave, std::int32_t row) {
@@ -102,20 +107,90 @@ void noise_row_by_cells(float* __restrict out, const float* __restrict sum, cons
     }
 }
 
-/// Column by column, for cells narrower than a block.
+#if defined(__AVX512F__)
+constexpr std::int32_t kRun = 16;
+#elif defined(__AVX2__)
+constexpr std::int32_t kRun = 8;
+#else
+constexpr std::int32_t kRun = 4;
+#endif
+
+/// A run of columns' values.
+using Run = float __attribute__((vector_size(4 * kRun)));
+
+Run load_run(const float* from) {
+    Run run;
+    __builtin_memcpy(&run, from, sizeof run);
+    return run;
+}
+
+/// Takes for a run of columns the entries of a table that column_cell names: these rise by at most
+/// two a column, so a run's lie within two vectors, where permutations cost a fraction of what
+/// gathers do.
+class Picker {
+  public:
+#if defined(__AVX512F__)
+    explicit Picker(const std::int32_t* cells)
+        : at_(_mm512_sub_epi32(_mm512_loadu_si512(cells), _mm512_set1_epi32(cells[0]))) {}
+
+    Run pick(const float* table) const {
+        return _mm512_permutex2var_ps(_mm512_loadu_ps(table), at_, _mm512_loadu_ps(table + kRun));
+    }
+
+  private:
+    __m512i at_;
+#elif defined(__AVX2__)
+    explicit Picker(const std::int32_t* cells)
+        : at_(_mm256_sub_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(cells)),
+                               _mm256_set1_epi32(cells[0]))),
+          is_high_(_mm256_castsi256_ps(_mm256_cmpgt_epi32(at_, _mm256_set1_epi32(kRun - 1)))) {}
+
+    Run pick(const float* table) const {
+        const __m256 low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), at_);
+        const __m256 high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table + kRun), at_);
+        return _mm256_blendv_ps(low, high, is_high_);
+    }
+
+  private:
+    __m256i at_;
+    __m256 is_high_;
+#else
+    explicit Picker(const std::int32_t* cells) : cells_(cells) {}
+
+    Run pick(const float* table) const {
+        const auto at = [this, table](std::int32_t i) { return table[cells_[i] - cells_[0]]; };
+        return Run{at(0), at(1), at(2), at(3)};
+    }
+
+  private:
+    const std::int32_t* cells_;
+#endif
+};
+
+/// Column by column, for cells narrower than a block. Whole runs; the cells of columns past the row
+/// are its last column's.
 void noise_row_by_columns(float* __restrict out, const float* __restrict sum, std::int32_t width,
                           const NoiseRows& octave, const LatticeRow& lattice) {
-    for (std::int32_t i = 0; i < width; ++i) {
-        const std::int32_t cell = octave.column_cell[i];
-        const float v0 = lattice.a[cell] + lattice.b[cell] * octave.fraction_x[i];
-        const float v1 = lattice.a[cell + 1] + lattice.b[cell + 1] * (octave.fraction_x[i] - 1.0F);
-        out[i] = sum[i] + octave.amplitude * (v0 + octave.fade_x[i] * (v1 - v0));
+    for (std::int32_t first = 0; first < width; first += kRun) {
+        const Picker picker(octave.column_cell + first);
+        const float* const a = lattice.a + octave.column_cell[first];
+        const float* const b = lattice.b + octave.column_cell[first];
+        const Run fraction = load_run(octave.fraction_x + first);
+        const Run v0 = picker.pick(a) + picker.pick(b) * fraction;
+        const Run v1 = picker.pick(a + 1) + picker.pick(b + 1) * (fraction - 1.0F);
+        const Run faded = load_run(octave.fade_x + first);
+        const Run value = load_run(sum + first) + octave.amplitude * (v0 + faded * (v1 - v0));
+        __builtin_memcpy(out + first, &value, sizeof value);
     }
 }
 
 void noise(float* out, std::int32_t stride, std::int32_t width, std::int32_t length,
            const NoiseRows* octaves, std::int32_t octave_count) {
     LatticeRow lattice;
+    for (std::int32_t i = 0; i < 2 * kRectangleSideMax + 2 + 2 * kBlock; ++i) {
+        lattice.a[i] = 0;
+        lattice.b[i] = 0;
+    }
     float zeros[kRectangleSideMax + 2 * kBlock];
     float sums[2][kRectangleSideMax + 2 * kBlock];
     // Cleared, since blocks run over into columns that no octave has: those stay harmless numbers.
