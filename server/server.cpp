@@ -444,6 +444,7 @@ Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, cons
         return tl::unexpected(listener.error());
     }
     impl->listener = *std::move(listener);
+    impl->listener->start();
     return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 
@@ -503,6 +504,7 @@ void Server::stop(std::chrono::milliseconds drain_time) {
     }
     // Workers first: their last answers are posted to the listener's loops.
     impl_->service.stop();
+    impl_->listener->close();  // before it is gone: its threads look at it, for the metrics
     impl_->listener.reset();
     if (const auto flushed = impl_->store->flush(); !flushed) {
         impl_->log.error("the store could not be flushed: " + flushed.error().message);

@@ -11,9 +11,6 @@ namespace {
 
 constexpr std::size_t kTile = kPlaneBlock;
 using Tile = std::uint32_t __attribute__((vector_size(kTile * sizeof(std::uint32_t))));
-/// The same anywhere in memory, whatever is said to lie there.
-using LooseTile = std::uint32_t
-    __attribute__((vector_size(kTile * sizeof(std::uint32_t)), aligned(4), may_alias));
 static_assert(kTile == 8, "transpose_columns is written out for eight");
 
 const std::uint32_t* words_of(const Limit* limit) {
@@ -113,21 +110,22 @@ void swap_halves(Tile& low, Tile& high, const Tile& a, const Tile& b) {
 TERRANE_CLONES
 void transpose_columns(std::uint32_t* to, const std::array<const std::uint32_t*, kTile>& from,
                        std::size_t words) {
-    const auto tile = [](const std::uint32_t* at) {
-        return static_cast<const LooseTile*>(static_cast<const void*>(at));
+    const auto load = [](Tile& tile, const std::uint32_t* at) {
+        std::memcpy(&tile, at, sizeof tile);
     };
-    const auto row = [&](std::size_t word) {
-        return static_cast<LooseTile*>(static_cast<void*>(to + word * SlotRows::kStride));
+    const auto store = [&](std::size_t word, const Tile& tile) {
+        std::memcpy(to + word * SlotRows::kStride, &tile, sizeof tile);
     };
     for (std::size_t word = 0; word < words; word += kTile) {
-        const Tile a0 = *tile(from[0] + word);
-        const Tile a1 = *tile(from[1] + word);
-        const Tile a2 = *tile(from[2] + word);
-        const Tile a3 = *tile(from[3] + word);
-        const Tile a4 = *tile(from[4] + word);
-        const Tile a5 = *tile(from[5] + word);
-        const Tile a6 = *tile(from[6] + word);
-        const Tile a7 = *tile(from[7] + word);
+        Tile a0, a1, a2, a3, a4, a5, a6, a7;
+        load(a0, from[0] + word);
+        load(a1, from[1] + word);
+        load(a2, from[2] + word);
+        load(a3, from[3] + word);
+        load(a4, from[4] + word);
+        load(a5, from[5] + word);
+        load(a6, from[6] + word);
+        load(a7, from[7] + word);
         Tile b0, b1, b2, b3, b4, b5, b6, b7;
         interleave_32(b0, b1, a0, a1);
         interleave_32(b2, b3, a2, a3);
@@ -142,14 +140,14 @@ void transpose_columns(std::uint32_t* to, const std::array<const std::uint32_t*,
         swap_halves(b1, b5, c1, c5);
         swap_halves(b2, b6, c2, c6);
         swap_halves(b3, b7, c3, c7);
-        *row(word) = b0;
-        *row(word + 1) = b1;
-        *row(word + 2) = b2;
-        *row(word + 3) = b3;
-        *row(word + 4) = b4;
-        *row(word + 5) = b5;
-        *row(word + 6) = b6;
-        *row(word + 7) = b7;
+        store(word, b0);
+        store(word + 1, b1);
+        store(word + 2, b2);
+        store(word + 3, b3);
+        store(word + 4, b4);
+        store(word + 5, b5);
+        store(word + 6, b6);
+        store(word + 7, b7);
     }
 }
 

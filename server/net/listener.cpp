@@ -498,7 +498,9 @@ struct Listener::Impl {
         }
     }
 
-    ~Impl() {
+    ~Impl() { close(); }
+
+    void close() {
         for (const auto& loop : loops) {
             asio::post(loop->context, [this, &loop = *loop] {
                 close_gates(loop);
@@ -640,13 +642,20 @@ Result<std::unique_ptr<Listener>> Listener::open(const ListenOptions& options,
     if (const auto bound = impl->bind(); !bound) {
         return tl::unexpected(bound.error());
     }
-    impl->run();
     return std::unique_ptr<Listener>(new Listener(std::move(impl)));
 }
 
 Listener::Listener(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Listener::~Listener() = default;
+
+void Listener::start() {
+    impl_->run();
+}
+
+void Listener::close() {
+    impl_->close();
+}
 
 Endpoint Listener::endpoint(std::size_t port_index) const {
     return impl_->gates.at(port_index)->bound;

@@ -61,13 +61,19 @@ struct ListenOptions {
 /// Calls from the owner's thread, but `sessions` and `traffic`: any.
 class Listener {
   public:
-    /// Fails with `io_error` if an address can't be bound.
+    /// Binds the ports; nobody is let in before start(). Fails with `io_error` if an address can't
+    /// be bound.
     static Result<std::unique_ptr<Listener>> open(const ListenOptions& options,
                                                   std::vector<ListenPort> ports);
-    /// Closes whatever is left and joins the threads.
+    /// As close() does.
     ~Listener();
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
+
+    /// Begins to accept. To be called once, when all is in place that protocols look at.
+    void start();
+    /// Closes whatever is left and joins the threads: no protocol is called after it.
+    void close();
 
     /// Where a port listens, in the order in which they were given; its number is never 0.
     Endpoint endpoint(std::size_t port_index) const;

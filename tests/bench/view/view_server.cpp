@@ -138,6 +138,7 @@ ViewServer::ViewServer(std::shared_ptr<const World> world, std::size_t workers,
         std::exit(1);
     }
     listener_ = *std::move(listener);
+    listener_->start();
 }
 
 ViewServer::~ViewServer() {
