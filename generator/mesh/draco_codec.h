@@ -17,7 +17,7 @@
 namespace terrane {
 
 /// Part of the encoding version: raised whenever a byte of a served mesh or chunk changes.
-inline constexpr std::uint32_t kEncodingVersion = 3;
+inline constexpr std::uint32_t kEncodingVersion = 4;
 
 inline constexpr std::int32_t kDracoStepsPerVoxel = 32;
 /// The largest input that decode_draco looks at; a chunk's mesh is a few kB to a few hundred.

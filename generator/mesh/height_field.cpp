@@ -3,6 +3,7 @@
 #include "protocol/base/check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -44,31 +45,68 @@ void add_cell(Mesh& mesh, std::uint32_t corner, std::uint32_t row) {
     }
 }
 
-/// Hangs a strip under a run of vertices on a side; the solid lies to the right of the way along
-/// it.
-void add_skirt(Mesh& mesh, std::uint32_t first, std::int64_t stride, std::int32_t count,
-               std::int64_t depth256) {
+/// The vertices of one side, one after the other; the solid lies to the right of the way.
+struct Side {
+    std::uint32_t first;
+    std::int64_t stride;
+    glm::vec3 outward;
+
+    std::uint32_t at(std::int32_t i) const {
+        return static_cast<std::uint32_t>(first + i * stride);
+    }
+};
+
+std::int32_t skirt_end256(const Mesh& mesh, std::uint32_t at, std::int64_t depth256) {
+    return static_cast<std::int32_t>(std::max<std::int64_t>(0, mesh.positions256[at].y - depth256));
+}
+
+/// Hangs a strip under a side.
+void add_skirt(Mesh& mesh, const Side& side, std::int32_t count, std::int64_t depth256) {
     auto below = static_cast<std::uint32_t>(mesh.vertex_count());
     for (std::int32_t i = 0; i < count; ++i) {
-        const auto at = static_cast<std::uint32_t>(first + i * stride);
+        const std::uint32_t at = side.at(i);
         glm::i32vec3 position = mesh.positions256[at];
-        position.y = static_cast<std::int32_t>(std::max<std::int64_t>(0, position.y - depth256));
+        position.y = skirt_end256(mesh, at, depth256);
         mesh.positions256.push_back(position);
         mesh.normals.push_back(glm::vec3(mesh.normals[at]));
         mesh.colors.push_back(glm::u8vec3(mesh.colors[at]));
         mesh.material_ids.push_back(std::uint8_t{mesh.material_ids[at]});
         if (i > 0) {
-            const auto before = static_cast<std::uint32_t>(at - stride);
+            const std::uint32_t before = side.at(i - 1);
             mesh.indices.insert(mesh.indices.end(), {at, before, below, before, below - 1, below});
         }
         ++below;
     }
 }
 
+/// Closes what is under a side's skirt, down to y = 0: the ends of level 0's caves.
+void add_cap(Mesh& mesh, const Side& side, std::int32_t count, std::int64_t depth256,
+             const Shade& rock) {
+    auto low = static_cast<std::uint32_t>(mesh.vertex_count()) + 1;
+    for (std::int32_t i = 0; i < count; ++i) {
+        const std::uint32_t at = side.at(i);
+        const glm::i32vec3 top = mesh.positions256[at];
+        for (const std::int32_t y256 : {skirt_end256(mesh, at, depth256), 0}) {
+            mesh.positions256.emplace_back(top.x, y256, top.z);
+            mesh.normals.push_back(side.outward);
+            mesh.colors.emplace_back(rock.r, rock.g, rock.b);
+            mesh.material_ids.push_back(rock.material);
+            mesh.parts.push_back(MeshPart::cave);
+        }
+        if (i > 0) {
+            const std::uint32_t high = low - 1;
+            mesh.indices.insert(mesh.indices.end(), {high, high - 2, low, high - 2, low - 2, low});
+        }
+        low += 2;
+    }
+}
+
 }  // namespace
 
 HeightFieldMesher::HeightFieldMesher(const WorldDefinition& definition)
-    : material_colors_(linear_colors_of(definition)), water_(definition) {}
+    : material_colors_(linear_colors_of(definition)),
+      has_caves_(definition.has_landscape()),
+      water_(definition) {}
 
 void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
     TERRANE_ASSERT(stack.position.lod >= 1);
@@ -103,10 +141,22 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
     if (with_skirts) {
         const std::int64_t depth256 = std::int64_t{kSkirtCells * kColumn256} << stack.position.lod;
         const std::uint32_t last = stride * stride - 1;
-        add_skirt(out, side, -1, vertices, depth256);                                  // z = 0
-        add_skirt(out, last - side, 1, vertices, depth256);                            // z = N
-        add_skirt(out, 0, stride, vertices, depth256);                                 // x = 0
-        add_skirt(out, last, -static_cast<std::int64_t>(stride), vertices, depth256);  // x = N
+        const std::array<Side, 4> sides = {{
+            {.first = side, .stride = -1, .outward = {0, 0, -1}},       // z = 0
+            {.first = last - side, .stride = 1, .outward = {0, 0, 1}},  // z = N
+            {.first = 0, .stride = stride, .outward = {-1, 0, 0}},      // x = 0
+            {.first = last, .stride = -static_cast<std::int64_t>(stride), .outward = {1, 0, 0}},
+        }};
+        for (const Side& each : sides) {
+            add_skirt(out, each, vertices, depth256);
+        }
+        if (has_caves_ && stack.position.lod == 1) {
+            out.parts.resize(out.vertex_count(), MeshPart::ground);
+            const Shade rock = shades_[stack.columns.column(0, 0).front().palette_id].shade;
+            for (const Side& each : sides) {
+                add_cap(out, each, vertices, depth256, rock);
+            }
+        }
     }
     water_.append_coarse(out, stack);
 }

@@ -6,6 +6,10 @@
 //
 // Where tiles of different levels meet, their edges follow different columns; skirts hang from the
 // four sides so that no hole can be seen between them. Open water has its own surface over its bed.
+//
+// Level 0's caves end where level 1 begins, as open tubes in the plane between them. So level 1's
+// tiles of a landscape go on under their skirts, down to y = 0, in rock of part `cave`: whoever sees
+// caves sees them end at a wall, and who leaves caves out leaves it out too.
 #pragma once
 
 #include "generator/mesh/mesh.h"
@@ -34,6 +38,7 @@ class HeightFieldMesher {
 
   private:
     std::vector<LinearColor> material_colors_;
+    bool has_caves_;
     std::vector<PaletteShade> shades_;
     std::vector<std::int32_t> tops256_;
     WaterSurface water_;

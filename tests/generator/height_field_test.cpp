@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <utility>
 
@@ -103,6 +105,65 @@ TEST(HeightField, SkirtsCloseItsSidesAndStayAboveZero) {
             EXPECT_GE(tile.mesh.positions256[i].y, 0);
         }
     }
+}
+
+/// What hangs in the plane at `at256` along one axis (0 or 2): its area by part, in 1/65536 square
+/// cells, doubled; and where it faces.
+struct Hanging {
+    std::map<MeshPart, std::int64_t> area;
+    std::map<std::int64_t, int> facing;  ///< the sign of the normal along the axis
+};
+
+Hanging hanging_at(const Mesh& mesh, int axis, std::int32_t at256) {
+    Hanging hanging;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+        const auto corner = [&](std::size_t j) { return mesh.positions256[mesh.indices[i + j]]; };
+        if (corner(0)[axis] != at256 || corner(1)[axis] != at256 || corner(2)[axis] != at256) {
+            continue;
+        }
+        const auto a = corner(1) - corner(0);
+        const auto b = corner(2) - corner(0);
+        const std::int64_t turned = axis == 0 ? std::int64_t{a.y} * b.z - std::int64_t{a.z} * b.y
+                                              : std::int64_t{a.x} * b.y - std::int64_t{a.y} * b.x;
+        const MeshPart part = mesh.parts.empty() ? MeshPart::ground : mesh.parts[mesh.indices[i]];
+        hanging.area[part] += std::abs(turned);
+        if (turned != 0) {
+            ++hanging.facing[turned > 0 ? 1 : -1];
+        }
+    }
+    return hanging;
+}
+
+// Whatever of level 0 ends at a side of level 1's tile, tubes above all, ends at something.
+TEST(HeightField, OfALandscapesLevelOneClosesItsSidesDownToZero) {
+    const auto world = load_shipped_world("karst");
+    ASSERT_NE(world, nullptr);
+    Tile tile = make_tile(*world, {.lod = 1, .x = -7, .z = 4}, true);
+    const std::int32_t side = tile.stack.side;
+    for (const int axis : {0, 2}) {
+        for (const std::int32_t at : {0, side}) {
+            std::int64_t under_the_edge = 0;
+            for (std::int32_t i = 0; i < side; ++i) {
+                const auto top = [&](std::int32_t along) {
+                    const std::size_t x = static_cast<std::size_t>(axis == 0 ? at : along);
+                    const std::size_t z = static_cast<std::size_t>(axis == 0 ? along : at);
+                    return tile.mesh.positions256[z * static_cast<std::size_t>(side + 1) + x].y;
+                };
+                under_the_edge += std::int64_t{256} * (top(i) + top(i + 1));
+            }
+            Hanging hanging = hanging_at(tile.mesh, axis, at * 256);
+            EXPECT_EQ(hanging.area[MeshPart::ground] + hanging.area[MeshPart::cave],
+                      under_the_edge);
+            EXPECT_GT(hanging.area[MeshPart::cave], hanging.area[MeshPart::ground]);
+            ASSERT_EQ(hanging.facing.size(), 1U);
+            EXPECT_EQ(hanging.facing.begin()->first, at == 0 ? -1 : 1) << "not outwards";
+        }
+    }
+    // Farther out nobody stands beside level 0, and the layers of format 1 have no such tubes.
+    tile = make_tile(*world, {.lod = 2, .x = -7, .z = 4}, true);
+    EXPECT_EQ(hanging_at(tile.mesh, 0, 0).area.count(MeshPart::cave), 0U);
+    tile = make_tile(*load_test_world("paper-B3-seed42"), {.lod = 1, .x = 0, .z = 0}, true);
+    EXPECT_TRUE(tile.mesh.parts.empty());
 }
 
 TEST(HeightField, EncodesAndDecodesAtEveryLevel) {
