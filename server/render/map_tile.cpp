@@ -3,17 +3,12 @@
 #include "generator/landscape/river_map.h"
 #include "generator/volume/color.h"
 #include "generator/volume/water.h"
-#include "protocol/base/mutex.h"
 #include "server/render/relief.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
-#include <limits>
+#include <memory>
 #include <optional>
 #include <string>
-#include <thread>
-#include <utility>
 #include <vector>
 
 namespace terrane {
@@ -201,37 +196,6 @@ Result<void> draw_block(Image& image, const Drawing& drawing, const MapArea& are
     return {};
 }
 
-/// What the threads of one map share.
-struct BlockQueue {
-    std::atomic<std::int32_t> next = 0;
-    Mutex mutex;
-    std::optional<Error> failure TERRANE_GUARDED_BY(mutex);
-
-    /// Ends the others after the blocks that they are at.
-    void fail_with(Error error) {
-        next = std::numeric_limits<std::int32_t>::max() / 2;
-        const MutexLock lock(mutex);
-        failure = failure ? std::move(failure) : std::move(error);
-    }
-};
-
-void draw_blocks(Image& image, BlockQueue& queue, const World& world, const MapArea& area,
-                 DrawProgress& progress) {
-    try {
-        StackGenerator generator(world);
-        const Drawing drawing{.world = &world, .generator = &generator};
-        for (std::int32_t block = queue.next++; block < blocks_of(area); block = queue.next++) {
-            if (auto drawn = draw_block(image, drawing, area, block); !drawn) {
-                queue.fail_with(drawn.error());
-                return;
-            }
-            progress.add_one();
-        }
-    } catch (const std::exception& error) {
-        queue.fail_with({.code = ErrorCode::internal, .message = error.what()});
-    }
-}
-
 }  // namespace
 
 Result<void> check_map_tile(const MapTile& tile) {
@@ -274,21 +238,14 @@ Result<Image> draw_map(const World& world, const MapArea& area, std::int32_t thr
     if (!image) {
         return image;
     }
-    BlockQueue queue;
-    DrawProgress progress(static_cast<std::uint64_t>(blocks_of(area)), tell);
-    {
-        std::vector<std::jthread> workers;
-        try {
-            for (std::int32_t i = 0; i < std::min(threads, blocks_of(area)); ++i) {
-                workers.emplace_back([&] { draw_blocks(*image, queue, world, area, progress); });
-            }
-        } catch (const std::exception& error) {
-            queue.fail_with({.code = ErrorCode::internal, .message = error.what()});
-        }
-    }
-    const MutexLock lock(queue.mutex);
-    if (queue.failure) {
-        return tl::unexpected(*queue.failure);
+    const auto drawn = draw_pieces(blocks_of(area), threads, tell, [&]() -> DrawPiece {
+        const auto generator = std::make_shared<StackGenerator>(world);
+        return [&, generator](std::int32_t block) {
+            return draw_block(*image, {.world = &world, .generator = generator.get()}, area, block);
+        };
+    });
+    if (!drawn) {
+        return tl::unexpected(drawn.error());
     }
     return image;
 }

@@ -8,7 +8,7 @@
 
 #include "protocol/base/coords.h"
 #include "protocol/base/result.h"
-#include "server/render/draw_progress.h"
+#include "server/render/draw_pieces.h"
 #include "server/render/drawing.h"
 #include "server/render/picture_keys.h"
 #include "server/render/png.h"

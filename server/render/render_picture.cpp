@@ -6,12 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <string>
-#include <thread>
-#include <vector>
 
 namespace terrane {
 namespace {
@@ -129,19 +127,16 @@ Result<Image> render_picture(const World& world, const PictureView& view, std::i
     }
     const Camera camera = camera_of(view, eye);
     const Light light = light_of(view, camera);
-    std::atomic<std::int32_t> next_row = 0;
-    DrawProgress progress(static_cast<std::uint64_t>(view.height), tell);
-    std::vector<std::jthread> workers;
-    for (std::int32_t i = 0; i < threads; ++i) {
-        workers.emplace_back([&] {
-            SceneReader reader(scene);
-            for (std::int32_t row = next_row++; row < view.height; row = next_row++) {
-                draw_row(*image, row, reader, camera, light);
-                progress.add_one();
-            }
-        });
+    const auto drawn = draw_pieces(view.height, threads, tell, [&]() -> DrawPiece {
+        const auto reader = std::make_shared<SceneReader>(scene);
+        return [&, reader](std::int32_t row) -> Result<void> {
+            draw_row(*image, row, *reader, camera, light);
+            return {};
+        };
+    });
+    if (!drawn) {
+        return tl::unexpected(drawn.error());
     }
-    workers.clear();
     return image;
 }
 

@@ -3,7 +3,7 @@
 
 #include "generator/terrain/world.h"
 #include "protocol/base/result.h"
-#include "server/render/draw_progress.h"
+#include "server/render/draw_pieces.h"
 #include "server/render/png.h"
 #include "server/render/scene.h"
 
