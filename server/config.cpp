@@ -1,5 +1,7 @@
 #include "server/config.h"
 
+#include "protocol/base/result.h"
+#include "protocol/wire/limits.h"
 #include "server/chunks/worker_pool.h"
 #include "server/http/tiles3d.h"
 #include "server/net/listener.h"
@@ -8,9 +10,19 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <ios>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

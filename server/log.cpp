@@ -1,12 +1,22 @@
 #include "server/log.h"
 
+#include "protocol/base/result.h"
+
 #include <nlohmann/json.hpp>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <array>
 #include <chrono>
+#include <cstddef>
+#include <ctime>
+#include <exception>
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <variant>
 
 namespace terrane {
 

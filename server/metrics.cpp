@@ -1,13 +1,22 @@
 #include "server/metrics.h"
 
+#include "protocol/base/result.h"
+#include "server/chunks/answer.h"
+
 #include <prometheus/counter.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <string_view>
 #include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

@@ -1,19 +1,40 @@
 #include "server/server.h"
 
 #include "generator/mesh/draco_codec.h"
+#include "generator/terrain/world.h"
+#include "generator/world/generator_version.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 #include "server/chunks/build_chunk.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/chunk_service.h"
+#include "server/chunks/counters.h"
+#include "server/chunks/in_flight.h"
 #include "server/chunks/store_identity.h"
 #include "server/http/content_routes.h"
 #include "server/http/core_routes.h"
+#include "server/http/http_message.h"
 #include "server/http/openapi.h"
 #include "server/http/problem.h"
+#include "server/http/tiles3d.h"
+#include "server/http/viewer_files.h"
+#include "server/log.h"
 #include "server/metrics.h"
+#include "server/net/endpoint.h"
+#include "server/net/http_session.h"
+#include "server/net/listener.h"
 #include "server/net/native_protocol.h"
+#include "server/net/outbox.h"
+#include "server/net/session_caps.h"
+#include "server/net/tls.h"
 #include "server/net/tokens.h"
 #include "server/net/websocket_protocol.h"
 #include "server/notice_limit.h"
+#include "storage/chunk_store.h"
 #include "storage/memory_store.h"
 #include "storage/rocksdb_store.h"
 
@@ -21,9 +42,17 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,8 +1,13 @@
 #include "server/toml_settings.h"
 
 #include "protocol/base/nearest_word.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
 
 namespace terrane {
 

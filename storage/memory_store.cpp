@@ -1,9 +1,21 @@
 #include "storage/memory_store.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
+#include "storage/chunk_store.h"
 #include "storage/record.h"
 
+#include <cstddef>
 #include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,10 +1,19 @@
 #include "storage/record.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "storage/chunk_store.h"
 
 #include <xxhash.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <initializer_list>
+#include <span>
+#include <string>
+#include <string_view>
 
 namespace terrane {
 namespace {

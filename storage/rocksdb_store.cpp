@@ -1,7 +1,10 @@
 #include "storage/rocksdb_store.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
 #include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
+#include "storage/chunk_store.h"
 #include "storage/record.h"
 #include "storage/store_directory.h"
 
@@ -15,9 +18,16 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 

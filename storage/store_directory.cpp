@@ -2,6 +2,7 @@
 
 #include "protocol/base/bytes.h"
 #include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "storage/record.h"
 
 #include <fcntl.h>
@@ -10,8 +11,12 @@
 
 #include <cerrno>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <ios>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>

@@ -2,10 +2,18 @@
 
 #include "generator/mesh/draco_codec.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/column_payload.h"
 #include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 namespace terrane {

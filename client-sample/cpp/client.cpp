@@ -2,11 +2,27 @@
 // goes to `paused_` and from there to `waiting_` again when its time has come.
 #include "client-sample/cpp/client.h"
 
+#include "client-sample/cpp/connection.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
+
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
+#include <optional>
 #include <set>
+#include <span>
+#include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace terrane {

@@ -2,13 +2,29 @@
 
 #include "client-sample/cpp/chunk_reader.h"
 #include "client-sample/cpp/view_set.h"
+#include "generator/mesh/mesh.h"
 #include "generator/mesh/mesh_world.h"
+#include "generator/volume/chunk.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/volume/voxel.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,6 +1,7 @@
 #include "client-sample/cpp/connection.h"
 
 #include "client-sample/cpp/tls_peer.h"
+#include "protocol/base/result.h"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/connect.hpp>
@@ -9,7 +10,13 @@
 #include <boost/asio/ssl.hpp>
 #include <boost/asio/write.hpp>
 
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace terrane {

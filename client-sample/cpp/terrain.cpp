@@ -1,10 +1,22 @@
 #include "client-sample/cpp/terrain.h"
 
 #include "client-sample/cpp/chunk_reader.h"
+#include "client-sample/cpp/client.h"
+#include "client-sample/cpp/column_map.h"
+#include "client-sample/cpp/connection.h"
+#include "client-sample/cpp/view_set.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

@@ -1,8 +1,12 @@
 #include "client-sample/cpp/tls_peer.h"
 
+#include "protocol/base/result.h"
+
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
+
+#include <string>
 
 namespace terrane {
 

@@ -1,8 +1,15 @@
 #include "client-sample/cpp/view_set.h"
 
+#include "protocol/base/coords.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
+
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <vector>
 
 namespace terrane {
 

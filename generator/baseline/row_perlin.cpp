@@ -3,9 +3,11 @@
 #include "generator/terrain/random.h"
 #include "protocol/base/clones.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,15 @@
 #include "generator/landscape/caves.h"
 #include "generator/landscape/numbers.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 namespace terrane {
 namespace {

@@ -1,13 +1,20 @@
 #include "generator/landscape/caves.h"
+#include "generator/landscape/fold.h"
 #include "generator/landscape/numbers.h"
 #include "generator/terrain/choose_composition.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,6 +1,9 @@
 #include "generator/landscape/column_limits.h"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 namespace terrane {
 

@@ -1,10 +1,20 @@
 #include "generator/landscape/column_maker.h"
 
+#include "generator/landscape/channels.h"
+#include "generator/landscape/column_limits.h"
+#include "generator/landscape/fractures.h"
 #include "generator/landscape/numbers.h"
+#include "generator/landscape/overhangs.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/region.h"
+#include "generator/volume/limit.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,17 @@
 // What replaces the layers of a column: lenses, the fillings of fractures, caves and their water.
+#include "generator/landscape/caves.h"
+#include "generator/landscape/channels.h"
+#include "generator/landscape/column_limits.h"
 #include "generator/landscape/column_maker.h"
+#include "generator/landscape/fractures.h"
+#include "generator/terrain/element.h"
+#include "generator/terrain/region.h"
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
 namespace terrane {
 namespace {

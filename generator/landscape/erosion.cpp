@@ -1,11 +1,20 @@
 #include "generator/landscape/erosion.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/landscape/relief.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,9 +1,14 @@
 #include "generator/landscape/fold.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
 namespace terrane {
 namespace {

@@ -1,12 +1,18 @@
 #include "generator/landscape/fractures.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

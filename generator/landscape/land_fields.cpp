@@ -1,6 +1,14 @@
 #include "generator/landscape/land_fields.h"
 
+#include "generator/landscape/erosion.h"
+#include "generator/landscape/fold.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/noise.h"
+
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <utility>
 
 namespace terrane {

@@ -1,12 +1,31 @@
 #include "generator/landscape/landscape.h"
 
+#include "generator/landscape/caves.h"
+#include "generator/landscape/channels.h"
 #include "generator/landscape/column_maker.h"
+#include "generator/landscape/fractures.h"
+#include "generator/landscape/landscape_palette.h"
 #include "generator/landscape/numbers.h"
+#include "generator/landscape/overhangs.h"
+#include "generator/landscape/resistance.h"
+#include "generator/terrain/column_writer.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/terrain/noise.h"
+#include "generator/terrain/plot_cache.h"
 #include "generator/terrain/random.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -3,9 +3,15 @@
 #include "generator/landscape/fold.h"
 #include "generator/landscape/fractures.h"
 #include "generator/landscape/river_graph.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,13 +1,23 @@
 #include "generator/landscape/overhangs.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/landscape/resistance.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/terrain/region.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

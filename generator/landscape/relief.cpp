@@ -1,12 +1,21 @@
 #include "generator/landscape/relief.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/landscape/river_graph.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

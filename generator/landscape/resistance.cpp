@@ -1,8 +1,15 @@
 #include "generator/landscape/resistance.h"
 
 #include "generator/terrain/choose_composition.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 

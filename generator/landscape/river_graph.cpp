@@ -1,13 +1,19 @@
 #include "generator/landscape/river_graph.h"
 
 #include "generator/landscape/numbers.h"
+#include "generator/terrain/kernels/landscape_kernels.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/random.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,15 @@
 #include "generator/landscape/river_map.h"
 
+#include "generator/landscape/channels.h"
+#include "generator/landscape/relief.h"
 #include "generator/terrain/kernels/kernel_choice.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/noise.h"
+#include "generator/terrain/world.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 
 namespace terrane {
 

@@ -11,15 +11,22 @@
 // game", 2012, on bits instead of cells. Rectangles do not reach over a band's end.
 #include "generator/mesh/blocky.h"
 
+#include "generator/mesh/mesh.h"
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
 #include "generator/mesh/water_surface.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 

@@ -1,5 +1,9 @@
 #include "generator/mesh/draco_codec.h"
 
+#include "generator/mesh/mesh.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+
 #include <draco/attributes/point_attribute.h>
 #include <draco/compression/config/compression_shared.h>
 #include <draco/compression/decode.h>
@@ -11,9 +15,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 

@@ -1,6 +1,11 @@
 #include "generator/mesh/glb.h"
 
+#include "generator/mesh/draco_codec.h"
 #include "generator/mesh/height_field.h"
+#include "generator/mesh/mesh.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 
 #include <draco/attributes/point_attribute.h>
 #include <draco/compression/config/compression_shared.h>
@@ -9,8 +14,10 @@
 #include <draco/mesh/mesh.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <memory>

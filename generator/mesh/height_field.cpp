@@ -1,10 +1,18 @@
 #include "generator/mesh/height_field.h"
 
+#include "generator/mesh/mesh.h"
+#include "generator/mesh/shade.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 
 namespace terrane {

@@ -1,9 +1,15 @@
 #include "generator/mesh/shade.h"
 
 #include "generator/volume/color.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

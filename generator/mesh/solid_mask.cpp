@@ -1,6 +1,9 @@
 #include "generator/mesh/solid_mask.h"
 
 #include "generator/mesh/lanes.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
@@ -8,6 +11,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,13 @@
 #include "generator/mesh/steep_normals.h"
 
+#include "generator/mesh/kernels/mesh_kernels.h"
+#include "generator/mesh/solid_mask.h"
+#include "generator/volume/limit.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 
 namespace terrane {

@@ -1,7 +1,14 @@
 #include "generator/mesh/surface_cells.h"
 
+#include "generator/mesh/solid_mask.h"
+#include "generator/mesh/water_surface.h"
+#include "generator/volume/limit.h"
+
 #include <algorithm>
 #include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -14,17 +14,24 @@
 
 #include "generator/mesh/kernels/mesh_kernels.h"
 #include "generator/mesh/lanes.h"
+#include "generator/mesh/mesh.h"
 #include "generator/mesh/shade.h"
 #include "generator/mesh/solid_mask.h"
 #include "generator/mesh/steep_normals.h"
 #include "generator/mesh/surface_cells.h"
 #include "generator/mesh/water_surface.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 

@@ -1,10 +1,20 @@
 #include "generator/mesh/water_surface.h"
 
+#include "generator/mesh/mesh.h"
+#include "generator/mesh/shade.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <optional>
+#include <span>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,15 @@
 #include "generator/terrain/choose_composition.h"
 
-#include <algorithm>
+#include "generator/terrain/random.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
 
 namespace terrane {
 namespace {

@@ -1,10 +1,18 @@
 #include "generator/terrain/column_writer.h"
 
+#include "generator/terrain/element.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/limit.h"
+
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,11 +1,19 @@
 #include "generator/terrain/element.h"
 
 #include "generator/terrain/choose_composition.h"
+#include "generator/terrain/layer_stack.h"
 #include "generator/terrain/random.h"
+#include "generator/terrain/world.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <tuple>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,10 +1,15 @@
 #include "generator/terrain/element_shape.h"
 
+#include "generator/terrain/element.h"
+#include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/random.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 namespace terrane {
 namespace {

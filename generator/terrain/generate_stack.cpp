@@ -3,11 +3,20 @@
 #include "generator/landscape/landscape.h"
 #include "generator/terrain/column_writer.h"
 #include "generator/terrain/kernels/kernel_choice.h"
+#include "generator/terrain/kernels/row_kernels.h"
 #include "generator/terrain/plot_cache.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/stack.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -2,10 +2,16 @@
 
 #include "generator/terrain/choose_composition.h"
 #include "generator/terrain/random.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numeric>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,9 +1,15 @@
 #include "generator/terrain/noise.h"
 
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
 #include "generator/terrain/random.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <utility>
 
 namespace terrane {

@@ -1,8 +1,13 @@
 #include "generator/terrain/plot_cache.h"
 
+#include "generator/terrain/element.h"
 #include "generator/terrain/random.h"
+#include "generator/terrain/world.h"
 
+#include <cstddef>
+#include <optional>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,12 +1,25 @@
 #include "generator/terrain/region.h"
 
 #include "generator/terrain/choose_composition.h"
+#include "generator/terrain/element.h"
+#include "generator/terrain/element_shape.h"
+#include "generator/terrain/kernels/row_kernels.h"
+#include "generator/terrain/kernels/vector_pad.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/terrain/noise.h"
+#include "generator/terrain/plot_cache.h"
 #include "generator/terrain/random.h"
+#include "generator/terrain/world.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 #include "protocol/base/coords.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
 
 namespace terrane {
 namespace {

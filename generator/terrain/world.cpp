@@ -1,11 +1,16 @@
 #include "generator/terrain/world.h"
 
 #include "generator/landscape/landscape_palette.h"
-#include "generator/terrain/noise.h"
+#include "generator/terrain/layer_stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 

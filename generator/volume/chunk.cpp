@@ -1,7 +1,13 @@
 #include "generator/volume/chunk.h"
 
+#include "generator/volume/cut_columns.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
 #include "protocol/base/check.h"
 
+#include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 

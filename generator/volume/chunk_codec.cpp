@@ -1,12 +1,24 @@
 #include "generator/volume/chunk_codec.h"
 
+#include "generator/volume/chunk.h"
 #include "generator/volume/column_codec.h"
+#include "generator/volume/column_encoder.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
-#include <string>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,8 +1,14 @@
 #include "generator/volume/color.h"
 
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -3,13 +3,18 @@
 #include "generator/volume/column_encoder.h"
 #include "generator/volume/derived_heights.h"
 #include "generator/volume/exceptions.h"
+#include "generator/volume/limit.h"
 #include "generator/volume/plane_coder.h"
 #include "generator/volume/signatures.h"
 #include "generator/volume/slot_values.h"
+#include "generator/world/composition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>

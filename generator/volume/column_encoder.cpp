@@ -1,10 +1,15 @@
 #include "generator/volume/column_encoder.h"
 
+#include "generator/volume/column_codec.h"
 #include "generator/volume/derived_heights.h"
 #include "generator/volume/exceptions.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/plane_coder.h"
 #include "generator/volume/plane_set.h"
 #include "generator/volume/signatures.h"
 #include "generator/volume/slot_rows.h"
+#include "generator/world/composition.h"
+#include "protocol/base/bytes.h"
 #include "protocol/base/clones.h"
 
 #include <algorithm>
@@ -12,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <span>
 #include <vector>
 

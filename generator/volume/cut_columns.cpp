@@ -1,13 +1,17 @@
 #include "generator/volume/cut_columns.h"
 
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "protocol/base/check.h"
 #include "protocol/base/clones.h"
-#include "protocol/base/coords.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,10 +1,13 @@
 #include "generator/volume/plane_coder.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/clones.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <span>

@@ -1,11 +1,19 @@
 #include "generator/volume/signatures.h"
 
+#include "generator/volume/limit.h"
 #include "generator/volume/slot_rows.h"
+#include "generator/world/composition.h"
+#include "protocol/base/bytes.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
+#include <span>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

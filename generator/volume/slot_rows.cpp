@@ -1,9 +1,12 @@
 #include "generator/volume/slot_rows.h"
 
+#include "generator/volume/limit.h"
+#include "generator/volume/plane_coder.h"
 #include "protocol/base/clones.h"
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstring>
 
 namespace terrane {

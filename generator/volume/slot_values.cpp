@@ -1,5 +1,11 @@
 #include "generator/volume/slot_values.h"
 
+#include "generator/volume/limit.h"
+#include "generator/volume/signatures.h"
+
+#include <cstddef>
+#include <cstdint>
+
 namespace terrane {
 
 void join_slots(ColumnGrid& columns, SlotValues& values, const SignatureRuns& runs) {

@@ -1,9 +1,15 @@
 #include "generator/volume/voxel.h"
 
+#include "generator/volume/chunk.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
 #include "protocol/base/check.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 
 namespace terrane {
 namespace {

@@ -2,6 +2,7 @@
 
 #include "generator/world/world_definition.h"
 #include "generator/world/world_table.h"
+#include "protocol/base/nearest_word.h"
 
 #include <toml++/toml.h>
 

@@ -12,7 +12,6 @@
 
 #include <toml++/toml.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>

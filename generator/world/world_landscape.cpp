@@ -7,6 +7,8 @@
 #include <toml++/toml.h>
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <string_view>
 
 namespace terrane {

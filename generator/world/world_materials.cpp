@@ -3,6 +3,7 @@
 #include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
 #include "generator/world/world_table.h"
+#include "protocol/base/nearest_word.h"
 
 #include <toml++/toml.h>
 

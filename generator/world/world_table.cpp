@@ -2,6 +2,7 @@
 
 #include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/nearest_word.h"
 
 #include <toml++/toml.h>
 
@@ -12,7 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <string_view>

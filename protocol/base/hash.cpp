@@ -3,6 +3,12 @@
 #include <xxhash.h>
 
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 
 namespace terrane {
 

@@ -4,6 +4,9 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace terrane {
 std::size_t edit_distance(std::string_view a, std::string_view b) {

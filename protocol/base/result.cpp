@@ -1,5 +1,7 @@
 #include "protocol/base/result.h"
 
+#include <string_view>
+
 namespace terrane {
 
 std::string_view to_string(ErrorCode code) {

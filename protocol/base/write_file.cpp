@@ -1,10 +1,15 @@
 #include "protocol/base/write_file.h"
 
+#include "protocol/base/result.h"
+
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <span>
 #include <string>
 #include <system_error>
 

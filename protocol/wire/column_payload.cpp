@@ -1,11 +1,15 @@
 #include "protocol/wire/column_payload.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/limits.h"
 
 #include <zstd.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 #include <string>
 
 namespace terrane {

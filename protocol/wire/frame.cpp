@@ -1,12 +1,18 @@
 #include "protocol/wire/frame.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/limits.h"
 
 #include <terrane_generated.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <optional>
+#include <span>
 #include <string>
-#include <utility>
 
 namespace terrane {
 

@@ -1,6 +1,8 @@
 #include "protocol/wire/messages.h"
 
 #include <array>
+#include <string_view>
+#include <variant>
 
 namespace terrane {
 

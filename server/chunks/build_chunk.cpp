@@ -2,20 +2,46 @@
 
 #include "generator/mesh/draco_codec.h"
 #include "generator/mesh/glb.h"
+#include "generator/mesh/water_surface.h"
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/chunk.h"
 #include "generator/volume/chunk_codec.h"
-#include "protocol/base/check.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/column_payload.h"
 #include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+#include "server/chunks/chunk_cache.h"
+#include "server/chunks/chunk_key.h"
 #include "server/chunks/chunk_record.h"
+#include "server/chunks/counters.h"
+#include "server/chunks/in_flight.h"
 #include "server/chunks/store_identity.h"
+#include "server/render/drawing.h"
 #include "server/render/map_tile.h"
+#include "server/render/picture_keys.h"
 #include "server/render/section.h"
+#include "storage/chunk_store.h"
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

@@ -1,7 +1,18 @@
 #include "server/chunks/chunk_record.h"
 
+#include "generator/world/composition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
+#include <string>
 
 namespace terrane {
 

@@ -1,15 +1,33 @@
 #include "server/chunks/chunk_service.h"
 
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+#include "server/chunks/chunk_cache.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/counters.h"
+#include "server/chunks/in_flight.h"
+#include "server/chunks/work_queue.h"
 #include "server/render/map_tile.h"
+#include "server/render/picture_keys.h"
 #include "server/render/section.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <new>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

@@ -1,8 +1,19 @@
 #include "server/chunks/in_flight.h"
 
+#include "protocol/base/coords.h"
+#include "protocol/base/mutex.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/work_queue.h"
+
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
+#include <optional>
+#include <stop_token>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

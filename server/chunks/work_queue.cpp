@@ -1,8 +1,14 @@
 #include "server/chunks/work_queue.h"
 
 #include "protocol/base/check.h"
+#include "protocol/base/mutex.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
 
 namespace terrane {
 

@@ -1,10 +1,14 @@
 #include "server/chunks/worker_pool.h"
 
 #include "protocol/base/check.h"
+#include "server/chunks/work_queue.h"
 
+#include <cstddef>
 #include <exception>
+#include <functional>
 #include <future>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

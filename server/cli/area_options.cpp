@@ -1,10 +1,16 @@
 #include "server/cli/area_options.h"
 
+#include "protocol/base/result.h"
 #include "server/chunks/worker_pool.h"
+#include "server/cli/arguments.h"
+#include "server/cli/rectangle_work.h"
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <thread>
 
 namespace terrane {

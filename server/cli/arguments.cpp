@@ -1,8 +1,15 @@
 #include "server/cli/arguments.h"
 
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+
 #include <array>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 namespace terrane {

@@ -1,7 +1,11 @@
 #include "server/cli/column.h"
 
 #include "generator/terrain/generate_stack.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/result.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
@@ -12,8 +16,10 @@
 #include <array>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace terrane {
 namespace {

@@ -1,5 +1,7 @@
 #include "server/cli/example_world.h"
 
+#include <string_view>
+
 namespace terrane {
 
 std::string_view example_world() {

@@ -1,5 +1,6 @@
 #include "server/cli/interrupt.h"
 
+#include <csignal>
 #include <ctime>
 
 namespace terrane {

@@ -1,4 +1,6 @@
 // terrane map: the world seen from above.
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
@@ -10,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>

@@ -1,9 +1,14 @@
 #include "server/cli/open_world.h"
 
 #include "generator/terrain/load_world.h"
+#include "generator/terrain/world.h"
+#include "generator/world/world_file.h"
 
 #include <cstdio>
+#include <filesystem>
+#include <memory>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

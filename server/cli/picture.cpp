@@ -1,4 +1,6 @@
 // terrane picture: the terrain as seen from somewhere.
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
@@ -11,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>

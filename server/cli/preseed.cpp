@@ -2,13 +2,20 @@
 #include "server/cli/preseed.h"
 
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/volume/stack.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 #include "server/chunks/store_identity.h"
 #include "server/cli/area_options.h"
 #include "server/cli/interrupt.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/cli/progress.h"
+#include "server/cli/rectangle_work.h"
+#include "storage/chunk_store.h"
 #include "storage/rocksdb_store.h"
 
 #include <CLI/CLI.hpp>
@@ -16,8 +23,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>

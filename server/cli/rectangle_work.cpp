@@ -1,18 +1,26 @@
 #include "server/cli/rectangle_work.h"
 
 #include "protocol/base/check.h"
+#include "protocol/base/coords.h"
 #include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 #include "server/chunks/worker_pool.h"
+#include "server/cli/arguments.h"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <numeric>
+#include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

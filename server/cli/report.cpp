@@ -1,12 +1,17 @@
 // terrane report: the paper's tables and figures beside ours, on this machine.
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
 #include "server/cli/program.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/stopwatch.h"
 #include "server/report/write_report.h"
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>

@@ -5,11 +5,18 @@
 // flushed, exit code 0. A second signal ends the program at once.
 #include "generator/world/world_file.h"
 #include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/limits.h"
+#include "server/chunks/counters.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/config.h"
 #include "server/http/tiles3d.h"
+#include "server/http/viewer_files.h"
+#include "server/log.h"
+#include "server/net/endpoint.h"
+#include "server/net/session_caps.h"
+#include "server/net/tls.h"
 #include "server/server.h"
 
 #include <CLI/CLI.hpp>
@@ -18,11 +25,14 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 namespace terrane {

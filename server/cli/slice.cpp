@@ -1,4 +1,7 @@
 // terrane slice: a picture of a vertical cut.
+#include "generator/terrain/generate_stack.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
 #include "server/cli/arguments.h"
 #include "server/cli/open_world.h"
@@ -8,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>

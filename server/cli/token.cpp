@@ -1,4 +1,6 @@
 // terrane token: makes tokens that let clients into a server, and shows which there are.
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/net/tokens.h"
@@ -6,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>

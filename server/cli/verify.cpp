@@ -3,23 +3,32 @@
 
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/kernels/kernel_choice.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/chunk.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/volume/stack.h"
 #include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
 #include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 #include "server/cli/area_options.h"
 #include "server/cli/interrupt.h"
 #include "server/cli/open_world.h"
 #include "server/cli/program.h"
 #include "server/cli/progress.h"
+#include "server/cli/rectangle_work.h"
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 

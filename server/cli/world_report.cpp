@@ -1,6 +1,11 @@
 #include "server/cli/world_report.h"
 
+#include "generator/terrain/layer_stack.h"
+#include "generator/terrain/world.h"
+#include "generator/world/composition.h"
 #include "generator/world/generator_version.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/hash.h"
 
 #include <nlohmann/json.hpp>
 

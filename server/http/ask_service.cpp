@@ -1,5 +1,14 @@
 #include "server/http/ask_service.h"
 
+#include "protocol/base/result.h"
+#include "server/chunks/answer.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/chunk_service.h"
+#include "server/chunks/in_flight.h"
+#include "server/http/http_message.h"
+
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>

@@ -1,18 +1,34 @@
 #include "server/http/content_routes.h"
 
+#include "generator/terrain/world.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/chunks/answer.h"
 #include "server/chunks/build_chunk.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/chunk_service.h"
 #include "server/http/ask_service.h"
+#include "server/http/core_routes.h"
+#include "server/http/http_message.h"
 #include "server/http/problem.h"
+#include "server/http/router.h"
+#include "server/http/tiles3d.h"
 #include "server/http/viewer_files.h"
+#include "server/render/picture_keys.h"
 #include "server/render/section.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace terrane {

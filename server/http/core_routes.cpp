@@ -1,14 +1,29 @@
 #include "server/http/core_routes.h"
 
 #include "generator/mesh/glb.h"
+#include "generator/terrain/world.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+#include "server/chunks/chunk_key.h"
 #include "server/http/ask_service.h"
+#include "server/http/http_message.h"
 #include "server/http/problem.h"
+#include "server/http/router.h"
 
 #include <nlohmann/json.hpp>
 
+#include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 
 namespace terrane {

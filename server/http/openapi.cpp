@@ -1,7 +1,9 @@
 #include "server/http/openapi.h"
 
+#include "protocol/base/coords.h"
 #include "server/chunks/chunk_key.h"
-#include "server/http/tiles3d.h"
+#include "server/http/http_message.h"
+#include "server/http/router.h"
 #include "server/render/map_tile.h"
 #include "server/render/section.h"
 
@@ -9,10 +11,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
-#include <span>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

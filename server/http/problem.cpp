@@ -1,6 +1,13 @@
 #include "server/http/problem.h"
 
+#include "protocol/base/result.h"
+#include "server/http/http_message.h"
+
 #include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
 
 namespace terrane {
 

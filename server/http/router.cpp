@@ -1,14 +1,25 @@
 #include "server/http/router.h"
 
 #include "protocol/base/check.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "server/http/http_message.h"
 #include "server/http/problem.h"
 
 #include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,9 +1,17 @@
 #include "server/http/tiles3d.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "server/chunks/chunk_key.h"
+
 #include <nlohmann/json.hpp>
 
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <string>
+#include <utility>
 
 namespace terrane {
 namespace {

@@ -1,11 +1,23 @@
 #include "server/http/viewer_files.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+#include "server/http/http_message.h"
+#include "server/http/router.h"
+
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <filesystem>
 #include <fstream>
+#include <ios>
 #include <iterator>
+#include <memory>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,5 +1,10 @@
 #include "server/net/admission.h"
 
+#include "protocol/base/mutex.h"
+
+#include <cstddef>
+#include <string>
+
 namespace terrane {
 
 bool Admission::enter(const std::string& address) {

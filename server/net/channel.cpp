@@ -1,6 +1,14 @@
 #include "server/net/channel.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+#include "server/net/byte_protocol.h"
+#include "server/net/tls.h"
+
 #include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <span>
 #include <utility>
 
 namespace terrane {

@@ -1,9 +1,15 @@
 #include "server/net/endpoint.h"
 
+#include "protocol/base/result.h"
+
 #include <arpa/inet.h>
 
 #include <array>
 #include <charconv>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <system_error>
 
 namespace terrane {
 

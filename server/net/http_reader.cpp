@@ -1,5 +1,6 @@
 #include "server/net/http_reader.h"
 
+#include "protocol/base/bytes.h"
 #include "server/http/router.h"
 
 #include <boost/asio/buffer.hpp>
@@ -8,6 +9,13 @@
 #include <boost/beast/http/rfc7230.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace terrane {

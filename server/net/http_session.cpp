@@ -1,12 +1,27 @@
 #include "server/net/http_session.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "server/http/http_message.h"
 #include "server/http/problem.h"
+#include "server/net/byte_protocol.h"
+#include "server/net/http_reader.h"
 #include "server/net/tokens.h"
 #include "server/net/websocket_frames.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <ctime>
-#include <thread>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace terrane {

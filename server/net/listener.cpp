@@ -1,18 +1,31 @@
 #include "server/net/listener.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
 #include "server/net/admission.h"
+#include "server/net/byte_protocol.h"
 #include "server/net/channel.h"
+#include "server/net/endpoint.h"
+#include "server/net/tls.h"
 
 #include <boost/asio.hpp>
 
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <unordered_set>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

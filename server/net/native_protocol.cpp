@@ -1,5 +1,14 @@
 #include "server/net/native_protocol.h"
 
+#include "server/net/byte_protocol.h"
+#include "server/net/outbox.h"
+#include "server/net/session.h"
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 namespace terrane {

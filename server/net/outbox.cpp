@@ -1,8 +1,13 @@
 #include "server/net/outbox.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/coords.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
 #include <utility>
 
 namespace terrane {

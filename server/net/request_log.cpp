@@ -1,6 +1,15 @@
 #include "server/net/request_log.h"
 
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+#include "server/log.h"
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace terrane {
 

@@ -1,10 +1,28 @@
 #include "server/net/session.h"
 
+#include "generator/world/composition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+#include "server/chunks/chunk_key.h"
+#include "server/chunks/counters.h"
+#include "server/chunks/in_flight.h"
+#include "server/net/outbox.h"
+#include "server/net/session_caps.h"
+#include "server/net/token_bucket.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <unordered_set>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace terrane {

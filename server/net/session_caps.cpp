@@ -1,8 +1,11 @@
 #include "server/net/session_caps.h"
 
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 #include "server/net/view.h"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace terrane {
 

@@ -1,7 +1,16 @@
 // The view's part of a session: what is wanted, what is forgotten, and the credit for it.
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+#include "server/chunks/answer.h"
+#include "server/net/outbox.h"
 #include "server/net/session.h"
+#include "server/net/view.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>

@@ -1,13 +1,18 @@
 #include "server/net/tls.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 
 #include <openssl/err.h>
 #include <openssl/ssl.h>
 
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <cstddef>
+#include <memory>
+#include <span>
 #include <string>
 #include <utility>
 

@@ -1,6 +1,9 @@
 #include "server/net/tokens.h"
 
 #include "protocol/base/bytes.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
 #include "server/http/router.h"
 #include "server/toml_settings.h"
@@ -10,12 +13,21 @@
 #include <openssl/sha.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
+#include <ios>
 #include <iterator>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

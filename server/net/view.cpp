@@ -1,11 +1,18 @@
 #include "server/net/view.h"
 
 #include "protocol/base/check.h"
+#include "protocol/base/coords.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 #include "server/chunks/work_queue.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <optional>
+#include <vector>
 
 namespace terrane {
 

@@ -1,9 +1,19 @@
 #include "server/net/websocket_frames.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+
 #include <openssl/evp.h>
 #include <openssl/sha.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace terrane {
 

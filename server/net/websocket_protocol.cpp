@@ -1,12 +1,27 @@
 #include "server/net/websocket_protocol.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
+#include "server/net/byte_protocol.h"
+#include "server/net/http_reader.h"
+#include "server/net/http_session.h"
+#include "server/net/outbox.h"
+#include "server/net/session.h"
 #include "server/net/tokens.h"
 #include "server/net/websocket_frames.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 

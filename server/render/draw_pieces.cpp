@@ -1,10 +1,13 @@
 #include "server/render/draw_pieces.h"
 
 #include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <thread>

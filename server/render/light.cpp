@@ -1,10 +1,14 @@
 #include "server/render/light.h"
 
 #include "generator/terrain/random.h"
+#include "generator/world/composition.h"
+#include "server/render/scene.h"
+#include "server/render/trace.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 namespace terrane {

@@ -1,13 +1,27 @@
 #include "server/render/map_tile.h"
 
 #include "generator/landscape/river_map.h"
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/noise.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/color.h"
+#include "generator/volume/limit.h"
 #include "generator/volume/water.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/render/draw_pieces.h"
+#include "server/render/drawing.h"
+#include "server/render/picture_keys.h"
 #include "server/render/relief.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 

@@ -1,10 +1,16 @@
 #include "server/render/png.h"
 
+#include "generator/world/world_definition.h"
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
 
 #include <png.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace terrane {
 

@@ -1,12 +1,16 @@
 #include "server/render/relief.h"
 
 #include "generator/volume/color.h"
+#include "generator/world/composition.h"
 
 #include <glm/glm.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,12 +1,19 @@
 #include "server/render/render_picture.h"
 
+#include "generator/terrain/world.h"
 #include "generator/volume/color.h"
+#include "generator/world/composition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/render/draw_pieces.h"
 #include "server/render/light.h"
+#include "server/render/scene.h"
 #include "server/render/trace.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 #include <string>

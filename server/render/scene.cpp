@@ -1,9 +1,19 @@
 #include "server/render/scene.h"
 
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/color.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "server/render/scene_tile.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
 
 namespace terrane {
 namespace {

@@ -1,12 +1,22 @@
 #include "server/render/scene_tile.h"
 
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/color.h"
+#include "generator/volume/limit.h"
 #include "generator/volume/voxel.h"
 #include "generator/volume/water.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

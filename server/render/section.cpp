@@ -1,12 +1,18 @@
 #include "server/render/section.h"
 
 #include "generator/volume/color.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/render/drawing.h"
+#include "server/render/picture_keys.h"
 #include "server/render/section_columns.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>

@@ -1,11 +1,23 @@
 #include "server/render/section_columns.h"
 
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/color.h"
+#include "generator/volume/limit.h"
 #include "generator/volume/water.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/render/drawing.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,9 +1,15 @@
 #include "server/render/trace.h"
 
+#include "server/render/scene.h"
+#include "server/render/scene_tile.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <optional>
 
 namespace terrane {
 namespace {

@@ -1,5 +1,10 @@
 #include "server/report/baselines.h"
 
+#include "generator/baseline/row_perlin.h"
+
+#include <cstddef>
+#include <cstdint>
+
 namespace terrane {
 namespace {
 

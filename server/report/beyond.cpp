@@ -2,22 +2,34 @@
 
 #include "generator/landscape/river_graph.h"
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
 #include "generator/volume/water.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 #include "server/render/png.h"
 #include "server/render/render_picture.h"
 #include "server/render/section.h"
+#include "server/report/chart.h"
 #include "server/report/joined_intervals.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <ctime>
 #include <limits>
-#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace terrane {

@@ -1,13 +1,13 @@
 #include "server/report/chart.h"
 
-#include "server/report/numbers.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,12 +1,20 @@
 #include "server/report/complexity.h"
 
+#include "generator/baseline/row_perlin.h"
 #include "generator/terrain/generate_stack.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
 #include "server/report/baselines.h"
+#include "server/report/chart.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/stopwatch.h"
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 

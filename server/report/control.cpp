@@ -1,11 +1,19 @@
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
 #include "server/report/metrics.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/survey.h"
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace terrane {

@@ -1,10 +1,17 @@
 #include "server/report/figures.h"
 
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "server/render/render_picture.h"
 #include "server/render/section.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 
 #include <array>
+#include <cstdint>
 #include <string>
 
 namespace terrane {

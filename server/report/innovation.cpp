@@ -1,11 +1,21 @@
+#include "generator/terrain/layer_stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
 #include "server/report/metrics.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/survey.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace terrane {

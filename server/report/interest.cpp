@@ -1,11 +1,20 @@
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
 #include "server/report/metrics.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <span>
 #include <string>

@@ -1,6 +1,8 @@
 #include "server/report/joined_intervals.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <numeric>
 
 namespace terrane {

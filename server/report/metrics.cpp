@@ -1,7 +1,12 @@
 #include "server/report/metrics.h"
 
-#include "generator/world/world_file.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
+#include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
+#include "server/report/speed.h"
 
 #include <algorithm>
 #include <string>

@@ -1,10 +1,14 @@
 #include "server/report/page.h"
 
+#include "protocol/base/bytes.h"
+#include "server/report/chart.h"
 #include "server/report/numbers.h"
 
 #include <cctype>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace terrane {

@@ -1,12 +1,22 @@
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/stack.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
 #include "server/report/metrics.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/stopwatch.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace terrane {

@@ -1,10 +1,16 @@
 #include "server/report/shipped_world.h"
 
+#include "generator/terrain/world.h"
+#include "generator/world/world_definition.h"
 #include "generator/world/world_file.h"
 #include "protocol/base/check.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
 #include <utility>
 
 namespace terrane {

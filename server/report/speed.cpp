@@ -1,16 +1,26 @@
 #include "server/report/speed.h"
 
+#include "generator/baseline/row_perlin.h"
 #include "generator/terrain/element.h"
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
 #include "generator/volume/chunk.h"
-#include "generator/volume/chunk_codec.h"
 #include "generator/volume/column_codec.h"
+#include "generator/volume/stack.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "server/report/baselines.h"
+#include "server/report/numbers.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/stopwatch.h"
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 namespace terrane {
 namespace {

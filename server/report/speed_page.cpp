@@ -1,6 +1,12 @@
+#include "server/report/chart.h"
+#include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/speed.h"
 
 #include <array>
+#include <cstddef>
+#include <string>
 
 namespace terrane {
 namespace {

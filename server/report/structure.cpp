@@ -1,12 +1,20 @@
+#include "generator/baseline/row_perlin.h"
 #include "generator/terrain/random.h"
-#include "server/report/baselines.h"
+#include "generator/terrain/world.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
+#include "server/report/chart.h"
 #include "server/report/metrics.h"
 #include "server/report/numbers.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/shipped_world.h"
 #include "server/report/survey.h"
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 

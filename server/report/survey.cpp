@@ -1,11 +1,21 @@
 #include "server/report/survey.h"
 
 #include "generator/terrain/element.h"
+#include "generator/terrain/generate_stack.h"
+#include "generator/terrain/region.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/limit.h"
 #include "generator/volume/voxel.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/result.h"
 #include "server/report/numbers.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

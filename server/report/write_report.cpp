@@ -1,10 +1,16 @@
 #include "server/report/write_report.h"
 
+#include "protocol/base/result.h"
 #include "server/report/beyond.h"
 #include "server/report/complexity.h"
 #include "server/report/figures.h"
 #include "server/report/metrics.h"
+#include "server/report/page.h"
+#include "server/report/report_options.h"
 #include "server/report/speed.h"
+
+#include <functional>
+#include <string>
 
 namespace terrane {
 

@@ -2,7 +2,16 @@
 
 #include "client-sample/cpp/program/http_carrier.h"
 #include "client-sample/cpp/program/websocket_stream.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+#include "protocol/wire/messages.h"
 
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 namespace terrane {

@@ -1,20 +1,34 @@
 #include "client-sample/cpp/program/get.h"
 
 #include "client-sample/cpp/chunk_reader.h"
+#include "client-sample/cpp/client.h"
+#include "client-sample/cpp/connection.h"
 #include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get_report.h"
 #include "client-sample/cpp/program/obj.h"
 #include "client-sample/cpp/program/program.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
+#include "protocol/wire/messages.h"
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

@@ -1,10 +1,20 @@
 #include "client-sample/cpp/program/get_report.h"
 
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
+
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdio>
+#include <iterator>
+#include <span>
+#include <string>
+#include <vector>
 
 namespace terrane {
 

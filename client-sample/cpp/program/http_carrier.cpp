@@ -1,12 +1,28 @@
 #include "client-sample/cpp/program/http_carrier.h"
 
+#include "client-sample/cpp/program/carrier.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
+
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
+#include <variant>
 
 namespace terrane {
 

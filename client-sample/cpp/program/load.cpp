@@ -1,15 +1,30 @@
 #include "client-sample/cpp/program/load.h"
 
+#include "client-sample/cpp/program/carrier.h"
+#include "client-sample/cpp/program/load_client.h"
+#include "client-sample/cpp/program/load_report.h"
 #include "client-sample/cpp/program/local_check.h"
+#include "client-sample/cpp/program/movement.h"
 #include "client-sample/cpp/program/stream_loop.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/messages.h"
 
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <set>
+#include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 

@@ -1,11 +1,28 @@
 #include "client-sample/cpp/program/load_client.h"
 
 #include "client-sample/cpp/chunk_reader.h"
+#include "client-sample/cpp/program/carrier.h"
+#include "client-sample/cpp/program/movement.h"
+#include "client-sample/cpp/view_set.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

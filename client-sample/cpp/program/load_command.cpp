@@ -1,19 +1,28 @@
 // The command line of `terrane-client load`.
+#include "client-sample/cpp/program/carrier.h"
 #include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get.h"
 #include "client-sample/cpp/program/load.h"
+#include "client-sample/cpp/program/load_report.h"
+#include "client-sample/cpp/program/movement.h"
 #include "client-sample/cpp/program/program.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
+#include <ios>
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace terrane {
 

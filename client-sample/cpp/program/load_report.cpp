@@ -1,10 +1,17 @@
 #include "client-sample/cpp/program/load_report.h"
 
+#include "client-sample/cpp/program/load_client.h"
+
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
+#include <span>
+#include <string>
 
 namespace terrane {
 

@@ -3,14 +3,33 @@
 #include "generator/mesh/blocky.h"
 #include "generator/mesh/draco_codec.h"
 #include "generator/mesh/height_field.h"
+#include "generator/mesh/mesh.h"
 #include "generator/mesh/surface_nets.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/load_world.h"
+#include "generator/terrain/world.h"
+#include "generator/volume/chunk.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "generator/world/world_file.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/mutex.h"
+#include "protocol/base/result.h"
 #include "protocol/wire/column_payload.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <memory>
+#include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
 

@@ -1,10 +1,17 @@
 #include "client-sample/cpp/program/movement.h"
 
+#include "protocol/base/result.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <numbers>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
 
 namespace terrane {
 

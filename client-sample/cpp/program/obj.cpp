@@ -1,9 +1,15 @@
 #include "client-sample/cpp/program/obj.h"
 
+#include "generator/mesh/mesh.h"
+#include "protocol/base/coords.h"
+#include "protocol/wire/messages.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <string>
 
 namespace terrane {
 

@@ -1,6 +1,9 @@
 #include "client-sample/cpp/program/stream_loop.h"
 
+#include "client-sample/cpp/connection.h"
 #include "client-sample/cpp/tls_peer.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/connect.hpp>
@@ -11,8 +14,12 @@
 #include <openssl/ssl.h>
 
 #include <array>
+#include <cstddef>
 #include <deque>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 

@@ -1,18 +1,32 @@
 #include "client-sample/cpp/program/view.h"
 
+#include "client-sample/cpp/connection.h"
 #include "client-sample/cpp/program/door_flags.h"
 #include "client-sample/cpp/program/get.h"
 #include "client-sample/cpp/program/program.h"
+#include "client-sample/cpp/program/raster.h"
+#include "client-sample/cpp/terrain.h"
+#include "generator/mesh/mesh.h"
+#include "generator/world/composition.h"
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
 #include "protocol/base/write_file.h"
+#include "protocol/wire/limits.h"
+#include "protocol/wire/messages.h"
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <numbers>
-#include <utility>
+#include <string>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

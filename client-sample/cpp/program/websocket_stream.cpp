@@ -1,11 +1,19 @@
 #include "client-sample/cpp/program/websocket_stream.h"
 
+#include "protocol/base/bytes.h"
+#include "protocol/base/result.h"
+
 #include <openssl/evp.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 
 namespace terrane {
 

@@ -1,12 +1,24 @@
 #include "client-sample/typescript/wasm/column_room.h"
 
+#include "generator/mesh/mesh.h"
 #include "generator/mesh/mesh_world.h"
+#include "generator/mesh/water_surface.h"
 #include "generator/volume/chunk_codec.h"
+#include "generator/volume/limit.h"
+#include "generator/volume/stack.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/result.h"
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace terrane {
 namespace {

@@ -1,12 +1,18 @@
 #include "client-sample/typescript/wasm/section.h"
 
+#include "client-sample/typescript/wasm/column_room.h"
 #include "generator/mesh/shade.h"
 #include "generator/volume/color.h"
+#include "generator/volume/limit.h"
+#include "generator/world/composition.h"
+#include "generator/world/world_definition.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
 
 namespace terrane {
 namespace {

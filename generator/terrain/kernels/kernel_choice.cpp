@@ -1,6 +1,10 @@
 #include "generator/terrain/kernels/kernel_choice.h"
 
+#include "generator/terrain/kernels/row_kernels.h"
+#include "protocol/base/result.h"
+
 #include <cstdlib>
+#include <span>
 #include <string>
 #include <vector>
 
