@@ -78,7 +78,7 @@ Result<void> Terrain::look(const Viewer& viewer) {
         return told;
     }
     has_looked_ = true;
-    ViewSet next(update, world());
+    const ViewSet next(update, world());
     if (next == view_) {
         return {};
     }

@@ -68,7 +68,8 @@ std::vector<StackPos> ViewSet::squares() const {
     std::vector<StackPos> squares;
     squares.reserve(size());
     for (std::size_t i = 0; i < levels_.size(); ++i) {
-        const auto& [there, split] = levels_[i];
+        const Rectangle& there = levels_[i].there;
+        const Rectangle& split = levels_[i].split;
         for (std::int64_t z = there.z.first; z <= there.z.last; ++z) {
             for (std::int64_t x = there.x.first; x <= there.x.last; ++x) {
                 if (!split.has(x, z)) {

@@ -63,7 +63,7 @@ void CaveField::add(std::size_t i, CaveGap gap) {
     if (counts_[i] == 0) {
         places_[i] = pool_used_++;
         if (pool_.size() < pool_used_ * kCavesPerColumnMax) {
-            pool_.resize(2 * pool_used_ * kCavesPerColumnMax);
+            pool_.resize(std::size_t{2} * pool_used_ * kCavesPerColumnMax);
         }
     }
     pool_[places_[i] * kCavesPerColumnMax + counts_[i]++] = gap;

@@ -214,18 +214,14 @@ void Landscape::raise_banks(const Region& region) {
     }
 }
 
-/// Layers, lenses and flow as far as they show in some column: what the relief has cut away needs
-/// none, nor what folds have taken under the bottom of the world.
-void Landscape::build_shown(Region& region, const TerrainConstants& constants,
-                            const RowKernels& kernels, PlotCache& plots) {
+/// Between which heights of the stack as it was laid down something of it shows, column by column:
+/// what is above the relief has been cut away, and folds have taken what is below the bottom of the
+/// world.
+void Landscape::find_shown(const Region& region) {
     constexpr float kSlack = 0.1F;  // voxels; far above rounding errors
     const RectangleShape& shape = region.shape;
-    const std::size_t plane = region.plane_size();
-    const std::size_t layers = constants.rules.size();
-    std::array<bool, kLayersMax> shows{};
-    shows[0] = true;
-    shown_.assign(plane, INT32_MIN);
-    buried_.assign(plane, INT32_MAX);
+    shown_.assign(region.plane_size(), INT32_MIN);
+    buried_.assign(region.plane_size(), INT32_MAX);
     const bool has_planes = !fractures_.is_empty();
     for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
         const auto first = static_cast<std::size_t>(z * shape.stride());
@@ -251,6 +247,16 @@ void Landscape::build_shown(Region& region, const TerrainConstants& constants,
             buried[x] = static_cast<std::int32_t>((-lifted[x] - kSlack) * kUnitsPerVoxel) - 1;
         }
     }
+}
+
+/// Layers, lenses and flow as far as they show in some column.
+void Landscape::build_shown(Region& region, const TerrainConstants& constants,
+                            const RowKernels& kernels, PlotCache& plots) {
+    const std::size_t plane = region.plane_size();
+    const std::size_t layers = constants.rules.size();
+    find_shown(region);
+    std::array<bool, kLayersMax> shows{};
+    shows[0] = true;
     overhangs_.for_each(
         [&](const Overhang& one) { shows[static_cast<std::size_t>(one.layer)] = true; });
     const auto any_below = [plane](const std::int32_t* low, const std::int32_t* high) {

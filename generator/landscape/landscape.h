@@ -68,6 +68,7 @@ class Landscape {
     void build_fields(const Region& region, const RowKernels& kernels);
     void build_ground(Region& region, const TerrainConstants& constants, const RowKernels& kernels);
     void raise_banks(const Region& region);
+    void find_shown(const Region& region);
     void build_shown(Region& region, const TerrainConstants& constants, const RowKernels& kernels,
                      PlotCache& plots);
     std::size_t field_index(const RectangleShape& shape, std::int32_t x, std::int32_t z) const;

@@ -49,7 +49,7 @@ class LatencyCounts {
 
   private:
     static constexpr double kStepsPerOctave = 32;
-    static constexpr std::size_t kSteps = 36 * 32;  ///< to 19 hours
+    static constexpr std::size_t kSteps = std::size_t{36} * 32;  ///< to 19 hours
 
     static std::size_t step_of(std::int64_t us) {
         return static_cast<std::size_t>(std::log2(static_cast<double>(us)) * kStepsPerOctave);

@@ -183,7 +183,7 @@ LocalCheck::LocalCheck(std::shared_ptr<const World> world, double share_toleranc
 
 LocalCheck::~LocalCheck() {
     {
-        MutexLock lock(mutex_);
+        const MutexLock lock(mutex_);
         is_over_ = true;
         queue_.clear();
     }
@@ -192,7 +192,7 @@ LocalCheck::~LocalCheck() {
 
 bool LocalCheck::offer(const ChunkAnswer& answer, std::span<const std::byte> payload) {
     {
-        MutexLock lock(mutex_);
+        const MutexLock lock(mutex_);
         if (queue_.size() >= kChecksQueuedMax) {
             return false;
         }
@@ -210,7 +210,7 @@ void LocalCheck::finish() {
 }
 
 CheckCounts LocalCheck::counts() const {
-    MutexLock lock(mutex_);
+    const MutexLock lock(mutex_);
     return counts_;
 }
 
@@ -236,7 +236,7 @@ void LocalCheck::run(const std::stop_token& stop) {
             checked = fail(ErrorCode::internal, std::string("checking failed: ") + error.what());
         }
         {
-            MutexLock lock(mutex_);
+            const MutexLock lock(mutex_);
             is_checking_ = false;
             ++counts_.checked;
             if (!checked) {
