@@ -45,7 +45,8 @@ struct GlbVertex {
     std::array<std::uint8_t, 4> color{};
 
     friend bool operator==(const GlbVertex& a, const GlbVertex& b) {
-        return std::memcmp(&a, &b, sizeof(GlbVertex)) == 0;
+        return std::memcmp(&a, &b, sizeof(GlbVertex)) ==
+               0;  // NOLINT(bugprone-suspicious-memory-comparison)
     }
 };
 
@@ -336,8 +337,12 @@ Bytes glb_of_parts(std::span<const DracoPart> parts, const DracoSettings& settin
         all.buffer_view += comma + one.buffer_view;
         binary.insert(binary.end(), parts[i].bytes.begin(), parts[i].bytes.end());
         if (parts[i].part == MeshPart::water) {
-            materials =
-                i > 0 ? materials + "," + std::string(kWaterMaterial) : std::string(kWaterMaterial);
+            if (i > 0) {
+                materials += ',';
+            } else {
+                materials.clear();  // all is water
+            }
+            materials += kWaterMaterial;
         }
     }
     const std::string json =

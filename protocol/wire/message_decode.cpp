@@ -1,14 +1,24 @@
 // FlatBuffers to plain values: the receiving half of messages.h. Everything a peer may get wrong
 // inside a well-formed FlatBuffer is caught here.
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+#include "protocol/wire/limits.h"
 #include "protocol/wire/messages.h"
 
 #include <terrane_generated.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
 
 namespace terrane {
 

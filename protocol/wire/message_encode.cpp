@@ -1,11 +1,25 @@
 // Plain values to FlatBuffers: the sending half of messages.h, and the proof that its tables are
 // the schema's.
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
+#include "protocol/base/coords.h"
+#include "protocol/base/hash.h"
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+#include "protocol/wire/limits.h"
 #include "protocol/wire/messages.h"
 
 #include <terrane_generated.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
 #include <vector>
 
 namespace terrane {

@@ -80,7 +80,7 @@ Result<std::optional<Answer>> ChunkService::request(const WorkKey& wish, std::in
         return fail(ErrorCode::draining, "the server is shutting down");
     }
     if (auto answer = cached(*key)) {
-        return std::optional(*std::move(answer));
+        return answer;
     }
     const WaiterId waiter_id = waiter.id;
     const auto admission =

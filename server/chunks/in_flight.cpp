@@ -171,7 +171,8 @@ InFlight::Left InFlight::leave(const WorkKey& key, WaiterId waiter) {
             left.withdrawn = {.job = id, .claim = {.flow = flow, .priority = 0}};
         }
     }
-    stop.request_stop();
+    stop.request_stop();  // NOLINT(clang-analyzer-cplusplus.Move): swapped with a copy, not moved
+                          // from
     return left;
 }
 

@@ -3,9 +3,9 @@
 #include <string_view>
 
 namespace terrane {
+namespace {
 
-std::string_view example_world() {
-    return R"(# A world of Terrane. Change anything, then:
+constexpr std::string_view kExampleWorld = R"(# A world of Terrane. Change anything, then:
 #
 #   terrane world check FILE     says everything that is wrong with it, with line and column
 #   terrane world show FILE      prints the layers it gives
@@ -142,6 +142,11 @@ next_layer = [
     ["limestone", "coal", 0.6],
 ]
 )";
+
+}  // namespace
+
+std::string_view example_world() {
+    return kExampleWorld;
 }
 
 }  // namespace terrane

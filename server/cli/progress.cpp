@@ -23,7 +23,7 @@ constexpr auto kSampleInterval = 500ms;
 constexpr auto kRateWindow = 20s;
 constexpr std::uint64_t kBarCells = 20;
 constexpr std::string_view kClearLine = "\r\x1b[K";
-constexpr double kDurationMax_s = 99.0 * 3600;
+constexpr double kDurationMaxSeconds = 99.0 * 3600;
 
 std::string decimal(double value, const char* format) {
     char text[64];
@@ -50,7 +50,7 @@ std::string eta_of(const ProgressState& state) {
 }  // namespace
 
 std::string format_duration(std::optional<double> seconds) {
-    if (!seconds || !(*seconds >= 0) || *seconds > kDurationMax_s) {
+    if (!seconds || !(*seconds >= 0) || *seconds > kDurationMaxSeconds) {
         return "-";
     }
     const auto whole = static_cast<int>(*seconds);

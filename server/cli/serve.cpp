@@ -149,7 +149,7 @@ Result<ServerConfig> config_of(const ServeFlags& flags, const std::vector<bool>&
 }
 
 Result<Endpoint> endpoint_of(const char* flag, const std::string& text) {
-    const auto endpoint = parse_endpoint(text);
+    auto endpoint = parse_endpoint(text);
     if (!endpoint) {
         return fail(endpoint.error().code, std::string(flag) + ": " + endpoint.error().message);
     }

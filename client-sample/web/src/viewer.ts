@@ -212,6 +212,7 @@ export class Viewer {
         if (xray !== undefined) {
             xray.toggle(!xray.isOn);
             this.materials.setGhost(xray.isOn ? 1 : 0);
+            this.world?.tiles.setGlass(xray.isOn);
             this.shell.press('xray', xray.isOn);
             this.needsFrame = true;
         }

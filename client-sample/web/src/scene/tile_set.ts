@@ -34,6 +34,7 @@ export class TileSet {
     private inner = new Set<string>();
     private roots: Square[] = [];
     private showsCaves = true;
+    private isGlass = false;
     private isDirty = true;
     private isFading = false;
     private clock = 0;
@@ -93,6 +94,12 @@ export class TileSet {
     /** What lies under much rock can be left out: nobody above the ground sees it. */
     setCaves(areShown: boolean): void {
         this.showsCaves = areShown;
+        this.tiles.forEach(({ mesh }) => mesh !== null && this.drawCaves(mesh));
+    }
+
+    /** Through ground of glass one would see the walls that coarse tiles close level 0's caves with. */
+    setGlass(isGlass: boolean): void {
+        this.isGlass = isGlass;
         this.tiles.forEach(({ mesh }) => mesh !== null && this.drawCaves(mesh));
     }
 
@@ -166,7 +173,9 @@ export class TileSet {
     }
 
     private drawCaves(mesh: THREE.Mesh): void {
-        mesh.geometry.setDrawRange(0, this.showsCaves ? Infinity : (mesh.userData.cavesFirst as number));
+        const { cavesFirst, lod } = mesh.userData as { cavesFirst: number; lod: number };
+        const isDrawn = this.showsCaves && !(this.isGlass && lod > 0);
+        mesh.geometry.setDrawRange(0, isDrawn ? Infinity : cavesFirst);
     }
 
     /** The ground, with the water as its child. Both have the same vertices. */
@@ -201,7 +210,7 @@ export class TileSet {
             water.matrixAutoUpdate = false;
             mesh.add(water);
         }
-        mesh.userData.cavesFirst = tile.cavesFirst;
+        mesh.userData = { cavesFirst: tile.cavesFirst, lod: square.lod };
         this.drawCaves(mesh);
         const scale = 2 ** square.lod;
         mesh.scale.set(scale, 1, scale);
