@@ -201,10 +201,19 @@ export class Viewer {
             const seenAt = over / Math.tan(Math.max(CUT_BELOW_CENTER - this.controls.pitch, CUT_BELOW_CENTER));
             cut.open({ x, z }, this.controls.yaw, Math.min(Math.max(CUT_AHEAD_MIN, seenAt), CUT_AHEAD_MAX));
         }
+        this.drawCaps();
         this.shell.press('cut', cut.isOn);
         this.shell.showTools(cut.isOn, cut.withFlow);
         this.stage.shadowsChanged();
         this.needsFrame = true;
+    }
+
+    /** The walls that close level 0's caves are in the way of who looks into the ground. */
+    private drawCaps(): void {
+        if (this.world !== undefined) {
+            const { tiles, cut, xray } = this.world;
+            tiles.setCaps(!cut.isOn && !xray.isOn);
+        }
     }
 
     toggleXray(): void {
@@ -212,7 +221,7 @@ export class Viewer {
         if (xray !== undefined) {
             xray.toggle(!xray.isOn);
             this.materials.setGhost(xray.isOn ? 1 : 0);
-            this.world?.tiles.setGlass(xray.isOn);
+            this.drawCaps();
             this.shell.press('xray', xray.isOn);
             this.needsFrame = true;
         }

@@ -34,7 +34,7 @@ export class TileSet {
     private inner = new Set<string>();
     private roots: Square[] = [];
     private showsCaves = true;
-    private isGlass = false;
+    private showsCaps = true;
     private isDirty = true;
     private isFading = false;
     private clock = 0;
@@ -97,9 +97,9 @@ export class TileSet {
         this.tiles.forEach(({ mesh }) => mesh !== null && this.drawCaves(mesh));
     }
 
-    /** Through ground of glass one would see the walls that coarse tiles close level 0's caves with. */
-    setGlass(isGlass: boolean): void {
-        this.isGlass = isGlass;
+    /** Caps are the walls that coarse tiles close level 0's caves with. */
+    setCaps(areShown: boolean): void {
+        this.showsCaps = areShown;
         this.tiles.forEach(({ mesh }) => mesh !== null && this.drawCaves(mesh));
     }
 
@@ -174,7 +174,7 @@ export class TileSet {
 
     private drawCaves(mesh: THREE.Mesh): void {
         const { cavesFirst, lod } = mesh.userData as { cavesFirst: number; lod: number };
-        const isDrawn = this.showsCaves && !(this.isGlass && lod > 0);
+        const isDrawn = this.showsCaves && (this.showsCaps || lod === 0);
         mesh.geometry.setDrawRange(0, isDrawn ? Infinity : cavesFirst);
     }
 
