@@ -66,7 +66,7 @@ MemoryBound memory_bound_of(const ServerOptions& options);
 /// Raises the limit of open descriptors as far as the system lets us, and gives it.
 std::size_t raise_descriptor_limit();
 
-/// Calls from the owner's thread, but `counters` and `metrics_text`: any.
+/// Calls from the owner's thread, but `counters`, and until stop() `metrics_text`: any.
 class Server {
   public:
     /// Opens the store, starts the workers, listens. `log` outlives the server. Fails with what the

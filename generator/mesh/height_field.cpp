@@ -113,7 +113,7 @@ void add_cap(Mesh& mesh, const Side& side, std::int32_t count, std::int64_t dept
 
 HeightFieldMesher::HeightFieldMesher(const WorldDefinition& definition)
     : material_colors_(linear_colors_of(definition)),
-      has_caves_(definition.has_landscape()),
+      is_landscape_(definition.has_landscape()),
       water_(definition) {}
 
 void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
@@ -158,7 +158,7 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
         for (const Side& each : sides) {
             add_skirt(out, each, vertices, depth256);
         }
-        if (has_caves_ && stack.position.lod == 1) {
+        if (is_landscape_ && stack.position.lod == 1) {
             out.parts.resize(out.vertex_count(), MeshPart::ground);
             const Shade rock = shades_[stack.columns.column(0, 0).front().palette_id].shade;
             for (const Side& each : sides) {

@@ -8,8 +8,10 @@
 // four sides so that no hole can be seen between them. Open water has its own surface over its bed.
 //
 // Level 0's caves end where level 1 begins, as open tubes in the plane between them. So level 1's
-// tiles of a landscape go on under their skirts, down to y = 0, in rock of part `cave`: whoever sees
-// caves sees them end at a wall, and who leaves caves out leaves it out too.
+// tiles of a landscape go on under their skirts, down to y = 0, in rock of part `cave`: whoever
+// sees caves sees them end at a wall. Who leaves caves out leaves it out too, and then sees tubes
+// end open that have less rock over them than makes a cave of them (kCaveRoofVoxels). The rock is
+// that under the tile's first column.
 #pragma once
 
 #include "generator/mesh/mesh.h"
@@ -38,7 +40,7 @@ class HeightFieldMesher {
 
   private:
     std::vector<LinearColor> material_colors_;
-    bool has_caves_;
+    bool is_landscape_;  ///< all that clients know too: with caves or without
     std::vector<PaletteShade> shades_;
     std::vector<std::int32_t> tops256_;
     WaterSurface water_;

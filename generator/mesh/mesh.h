@@ -16,7 +16,8 @@ namespace terrane {
 /// cave and of the ground is ground.
 enum class MeshPart : std::uint8_t {
     ground = 0,
-    cave = 1,   ///< under kCaveRoofVoxels of rock or more: not seen from above the ground
+    cave = 1,  ///< under kCaveRoofVoxels of rock or more: not seen from above the ground; and level
+               ///< 1's walls, see height_field.h
     water = 2,  ///< the water's own surface: to be seen, not to be walked on
 };
 

@@ -514,6 +514,12 @@ struct Listener::Impl {
     ~Impl() { close(); }
 
     void close() {
+        if (threads.empty()) {  // nobody runs the loops: not started, or closed already
+            for (const auto& gate : gates) {
+                gate->close();
+            }
+            return;
+        }
         for (const auto& loop : loops) {
             asio::post(loop->context, [this, &loop = *loop] {
                 close_gates(loop);
@@ -538,6 +544,7 @@ struct Listener::Impl {
     }
 
     void run() {
+        TERRANE_ASSERT(threads.empty());
         for (const auto& gate : gates) {
             accept(*gate);
         }

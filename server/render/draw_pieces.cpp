@@ -1,5 +1,6 @@
 #include "server/render/draw_pieces.h"
 
+#include "protocol/base/check.h"
 #include "protocol/base/mutex.h"
 #include "protocol/base/result.h"
 
@@ -74,6 +75,7 @@ class Pieces {
 
 Result<void> draw_pieces(std::int32_t count, std::int32_t threads, const TellDrawn& tell,
                          const std::function<DrawPiece()>& begin) {
+    TERRANE_ASSERT(threads >= 1);
     Pieces pieces(count, tell);
     {
         std::vector<std::jthread> workers;

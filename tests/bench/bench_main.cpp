@@ -50,8 +50,9 @@ class CollectingReporter : public benchmark::ConsoleReporter {
                 run.run_name.function_name + (arguments.empty() ? "" : "/" + arguments);
             times_[name].push_back(seconds);
             for (const auto& [counter, value] : run.counters) {
-                if (const std::size_t unit = counter.rfind("_s"); unit == counter.size() - 2) {
-                    times_[name + ":" + counter.substr(0, unit)].push_back(value.value);
+                if (counter.ends_with("_s")) {
+                    times_[name + ":" + counter.substr(0, counter.size() - 2)].push_back(
+                        value.value);
                 }
             }
         }

@@ -191,7 +191,8 @@ void workers(benchmark::State& state) {
         seconds[3] += timed_additions(2);
         ++round;
     }
-    const std::array<const char*, 4> names = {"one_s", "two_s", "additions_one_s", "additions_two_s"};
+    const std::array<const char*, 4> names = {"one_s", "two_s", "additions_one_s",
+                                              "additions_two_s"};
     for (std::size_t i = 0; i < names.size(); ++i) {
         state.counters[names[i]] = seconds[i] / static_cast<double>(state.iterations());
     }

@@ -34,8 +34,8 @@ std::uint64_t mixed(std::uint64_t hash) {
     return hash ^ (hash >> 31U);
 }
 
-/// Unit vectors at (n + 1/2) * 22.5 degrees from +x, n a hash's four highest bits. Folded into an
-/// eighth of the circle and chosen by comparisons: looking them up would be one lane at a time.
+/// Unit vectors at (n + 1/2) * 22.5 degrees from +x, n a hash's four highest bits. Folded into a
+/// quarter of the circle and chosen by comparisons: looking them up would be one lane at a time.
 /// Loops over whole rows: within blocks, compilers unroll the hashes into scalars.
 void gradients(float* __restrict x, float* __restrict z,
                const std::uint64_t* __restrict column_hash, std::uint64_t row_value,
@@ -167,8 +167,8 @@ class Picker {
 #endif
 };
 
-/// Column by column, for cells narrower than a block. Whole runs; the cells of columns past the row
-/// are its last column's.
+/// Run by run, for cells too narrow to go cell by cell. Whole runs; the cells of columns past the
+/// row are its last column's.
 void noise_row_by_columns(float* __restrict out, const float* __restrict sum, std::int32_t width,
                           const NoiseRows& octave, const LatticeRow& lattice) {
     for (std::int32_t first = 0; first < width; first += kRun) {
