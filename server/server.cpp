@@ -473,7 +473,11 @@ Result<std::unique_ptr<Server>> Server::start(const ServerOptions& options, cons
         return tl::unexpected(listener.error());
     }
     impl->listener = *std::move(listener);
-    impl->listener->start();
+    if (const auto started = impl->listener->start(); !started) {
+        impl->service.stop();
+        impl->listener->close();
+        return tl::unexpected(started.error());
+    }
     return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 
@@ -493,10 +497,6 @@ std::optional<Endpoint> Server::http_endpoint() const {
 
 const ServiceCounters& Server::counters() const {
     return impl_->counters;
-}
-
-std::string Server::metrics_text() const {
-    return impl_->metrics.text(impl_->samples());
 }
 
 void Server::reload() {

@@ -66,11 +66,11 @@ MemoryBound memory_bound_of(const ServerOptions& options);
 /// Raises the limit of open descriptors as far as the system lets us, and gives it.
 std::size_t raise_descriptor_limit();
 
-/// Calls from the owner's thread, but `counters`, and until stop() `metrics_text`: any.
+/// Calls from the owner's thread, but `counters`: any.
 class Server {
   public:
     /// Opens the store, starts the workers, listens. `log` outlives the server. Fails with what the
-    /// store says, or `io_error` if the address can't be bound.
+    /// store says, `io_error` if the address can't be bound, or `internal` if there are no threads.
     static Result<std::unique_ptr<Server>> start(const ServerOptions& options, const Log& log);
     /// Stops, if nobody has.
     ~Server();
@@ -81,8 +81,6 @@ class Server {
     Endpoint endpoint() const;
     std::optional<Endpoint> http_endpoint() const;
     const ServiceCounters& counters() const;
-    /// What /metrics says.
-    std::string metrics_text() const;
     /// Reads certificate, key and tokens again. What can't be used leaves the old in force; the log
     /// says so.
     void reload();

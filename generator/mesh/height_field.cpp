@@ -87,13 +87,16 @@ void add_skirt(Mesh& mesh, const Side& side, std::int32_t count, std::int64_t de
     }
 }
 
-/// Closes what is under a side's skirt, down to y = 0: the ends of level 0's caves.
+/// Closes what is under a side's skirt, down to y = 0: the ends of level 0's caves. Shows what each
+/// column stands on.
 void add_cap(Mesh& mesh, const Side& side, std::int32_t count, std::int64_t depth256,
-             const Shade& rock) {
+             const ColumnGrid& columns, std::span<const PaletteShade> shades) {
     auto low = static_cast<std::uint32_t>(mesh.vertex_count()) + 1;
     for (std::int32_t i = 0; i < count; ++i) {
         const std::uint32_t at = side.at(i);
         const glm::i32vec3 top = mesh.positions256[at];
+        const Limit& base = columns.column(top.x / kColumn256, top.z / kColumn256).front();
+        const Shade rock = shades[base.palette_id].shade;
         for (const std::int32_t y256 : {skirt_end256(mesh, at, depth256), 0}) {
             mesh.positions256.emplace_back(top.x, y256, top.z);
             mesh.normals.push_back(side.outward);
@@ -160,9 +163,8 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
         }
         if (is_landscape_ && stack.position.lod == 1) {
             out.parts.resize(out.vertex_count(), MeshPart::ground);
-            const Shade rock = shades_[stack.columns.column(0, 0).front().palette_id].shade;
             for (const Side& each : sides) {
-                add_cap(out, each, vertices, depth256, rock);
+                add_cap(out, each, vertices, depth256, stack.columns, shades_);
             }
         }
     }

@@ -10,8 +10,7 @@
 // Level 0's caves end where level 1 begins, as open tubes in the plane between them. So level 1's
 // tiles of a landscape go on under their skirts, down to y = 0, in rock of part `cave`: whoever
 // sees caves sees them end at a wall. Who leaves caves out leaves it out too, and then sees tubes
-// end open that have less rock over them than makes a cave of them (kCaveRoofVoxels). The rock is
-// that under the tile's first column.
+// end open that have less rock over them than makes a cave of them (kCaveRoofVoxels).
 #pragma once
 
 #include "generator/mesh/mesh.h"

@@ -497,6 +497,13 @@ struct Gate {
     }
 };
 
+/// Ends a loop, whatever is thrown meanwhile: somebody waits for it.
+struct StopAtEnd {
+    asio::io_context& context;
+
+    ~StopAtEnd() { context.stop(); }
+};
+
 }  // namespace
 
 struct Listener::Impl {
@@ -522,13 +529,13 @@ struct Listener::Impl {
         }
         for (const auto& loop : loops) {
             asio::post(loop->context, [this, &loop = *loop] {
+                const StopAtEnd stop{loop.context};
                 close_gates(loop);
+                loop.timer.cancel();
                 for (const auto& connection :
                      std::vector(loop.connections.begin(), loop.connections.end())) {
                     connection->close();
                 }
-                loop.timer.cancel();
-                loop.context.stop();
             });
         }
         threads.clear();
@@ -669,8 +676,14 @@ Listener::Listener(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Listener::~Listener() = default;
 
-void Listener::start() {
-    impl_->run();
+Result<void> Listener::start() {
+    try {
+        impl_->run();
+    } catch (const std::exception& error) {
+        return fail(ErrorCode::internal,
+                    std::string("threads for connections cannot be started: ") + error.what());
+    }
+    return {};
 }
 
 void Listener::close() {

@@ -70,8 +70,9 @@ class Listener {
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
-    /// Begins to accept. To be called once, when all is in place that protocols look at.
-    void start();
+    /// Begins to accept. To be called once, when all is in place that protocols look at. Fails with
+    /// `internal` if there are no threads for it; then close() is all that may follow.
+    Result<void> start();
     /// Closes whatever is left and joins the threads: no protocol is called after it.
     void close();
 

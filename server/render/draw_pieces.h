@@ -16,8 +16,8 @@ using TellDrawn = std::function<void(std::uint64_t done, std::uint64_t total)>;
 using DrawPiece = std::function<Result<void>(std::int32_t piece)>;
 
 /// Draws pieces 0..count-1, in at most `threads` threads, each of which calls `begin` once for its
-/// own DrawPiece; `tell` may be empty. Returns the first failure, after which no piece is begun;
-/// what is thrown (out of memory, most likely) is an `internal` one.
+/// own DrawPiece; `tell` may be empty. Returns the first failure, after which no piece is handed
+/// out; exceptions (out of memory, most likely) are `internal` ones. Needs: threads >= 1.
 Result<void> draw_pieces(std::int32_t count, std::int32_t threads, const TellDrawn& tell,
                          const std::function<DrawPiece()>& begin);
 

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <map>
@@ -159,7 +160,15 @@ TEST(HeightField, OfALandscapesLevelOneClosesItsSidesDownToZero) {
             EXPECT_EQ(hanging.facing.begin()->first, at == 0 ? -1 : 1) << "not outwards";
         }
     }
-    // Farther out nobody stands beside level 0, and the layers of format 1 have no such tubes.
+    const auto tallest = static_cast<std::int32_t>(world->stack.height_bound) + 3;
+    const auto bytes = encode_draco(tile.mesh, {.side = side, .height_voxels = tallest});
+    ASSERT_TRUE(bytes);
+    const auto decoded = decode_draco(*bytes);
+    ASSERT_TRUE(decoded);
+    EXPECT_EQ(std::ranges::count(decoded->parts, MeshPart::cave),
+              std::ranges::count(tile.mesh.parts, MeshPart::cave));
+    // Farther out seldom anybody stands beside level 0, and the layers of format 1 have no such
+    // tubes.
     tile = make_tile(*world, {.lod = 2, .x = -7, .z = 4}, true);
     EXPECT_EQ(hanging_at(tile.mesh, 0, 0).area.count(MeshPart::cave), 0U);
     tile = make_tile(*load_test_world("paper-B3-seed42"), {.lod = 1, .x = 0, .z = 0}, true);

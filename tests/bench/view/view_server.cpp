@@ -138,7 +138,10 @@ ViewServer::ViewServer(std::shared_ptr<const World> world, std::size_t workers,
         std::exit(1);
     }
     listener_ = *std::move(listener);
-    listener_->start();
+    if (const auto started = listener_->start(); !started) {
+        std::fprintf(stderr, "%s\n", started.error().message.c_str());
+        std::exit(1);
+    }
 }
 
 ViewServer::~ViewServer() {
