@@ -150,7 +150,7 @@ void Log::write(LogLevel level, std::string_view message,
                                      ? json_line(utc_now(), name, message, fields)
                                      : text_line(message, fields);
         impl_->logger.log(spdlog_level(level), spdlog::string_view_t(line.data(), line.size()));
-    } catch (const std::exception&) {  // out of memory: the line is lost, the server goes on
+    } catch (const std::exception&) {  // no memory: the line is lost, the server goes on
     }
 }
 

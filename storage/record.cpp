@@ -65,12 +65,12 @@ struct XxhState {
 /// XXH3-128 over version, key and value, so that a value filed under another key does not pass.
 Hash128 record_checksum(std::uint8_t version, std::string_view key,
                         std::span<const std::byte> value) {
-    thread_local const XxhState hasher;
-    XXH3_128bits_reset(hasher.state);
-    XXH3_128bits_update(hasher.state, &version, 1);
-    XXH3_128bits_update(hasher.state, key.data(), key.size());
-    XXH3_128bits_update(hasher.state, value.data(), value.size());
-    const XXH128_hash_t hash = XXH3_128bits_digest(hasher.state);
+    thread_local const XxhState kHasher;
+    XXH3_128bits_reset(kHasher.state);
+    XXH3_128bits_update(kHasher.state, &version, 1);
+    XXH3_128bits_update(kHasher.state, key.data(), key.size());
+    XXH3_128bits_update(kHasher.state, value.data(), value.size());
+    const XXH128_hash_t hash = XXH3_128bits_digest(kHasher.state);
     return {.high = hash.high64, .low = hash.low64};
 }
 

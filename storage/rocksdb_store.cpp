@@ -111,9 +111,9 @@ void keep_for_ever(rocksdb::DB* db, std::vector<rocksdb::ColumnFamilyHandle*> fa
     };
 
     static Mutex mutex;
-    static auto* const kept = new std::vector<Kept>;
+    static auto* const kKept = new std::vector<Kept>;
     const MutexLock lock(mutex);
-    kept->push_back({.db = db, .families = std::move(families)});
+    kKept->push_back({.db = db, .families = std::move(families)});
 }
 
 /// An open database; closes column families before it.

@@ -45,8 +45,8 @@ struct GlbVertex {
     std::array<std::uint8_t, 4> color{};
 
     friend bool operator==(const GlbVertex& a, const GlbVertex& b) {
-        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): no padding, and bits are what
-        // counts
+        // No padding, and bits are what counts.
+        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
         return std::memcmp(&a, &b, sizeof(GlbVertex)) == 0;
     }
 };

@@ -339,7 +339,7 @@ void HttpSession::log_answer(unsigned status, std::size_t body_bytes) const {
 
 void HttpSession::refuse(const HttpFault& fault) {
     context_.counters->by_class.at(fault.status / 100).fetch_add(1, std::memory_order_relaxed);
-    HttpResponse response = http_problem(fault.status, fault.detail);
+    const HttpResponse response = http_problem(fault.status, fault.detail);
     const auto id = context_.next_request_id->fetch_add(1, std::memory_order_relaxed);
     outbox_.push(http_head(response, id, false, http_date(std::chrono::system_clock::now())),
                  response.body);

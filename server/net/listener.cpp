@@ -163,7 +163,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     /// Runs a step of the protocol and then whatever reading and writing follows from it. One of
     /// the places where exceptions end: they end the connection.
     template <typename Step>
-    void guarded(Step step) {
+    void guarded(const Step& step) {
         const auto alive = shared_from_this();
         try {
             step();
@@ -518,7 +518,15 @@ struct Listener::Impl {
         }
     }
 
-    ~Impl() { close(); }
+    ~Impl() {
+        try {
+            close();
+        } catch (const std::exception&) {  // no memory to tell the loops: they end as they are
+            for (const auto& loop : loops) {
+                loop->context.stop();
+            }
+        }
+    }
 
     void close() {
         if (threads.empty()) {  // nobody runs the loops: not started, or closed already

@@ -206,7 +206,7 @@ void Session::handle_one(const ChunkCancel& cancel) {
     std::vector<Wish> cancelled;
     for (auto at = waiting_.begin(); at != waiting_.end();) {
         if (ids.contains(at->second.request_id)) {
-            cancelled.push_back(std::move(at->second));
+            cancelled.push_back(at->second);
             at = waiting_.erase(at);
         } else {
             ++at;
@@ -215,7 +215,7 @@ void Session::handle_one(const ChunkCancel& cancel) {
     for (auto at = under_way_.begin(); at != under_way_.end();) {
         if (ids.contains(at->second.request_id)) {
             context_.service->cancel(at->second.key, at->first);
-            cancelled.push_back(std::move(at->second));
+            cancelled.push_back(at->second);
             at = under_way_.erase(at);
         } else {
             ++at;
@@ -285,7 +285,7 @@ void Session::add(Wish wish) {
     }
     wish.rank = {.urgency = -static_cast<std::int64_t>(wish.priority),
                  .sequence = next_sequence_++};
-    waiting_.emplace(wish.rank, std::move(wish));
+    waiting_.emplace(wish.rank, wish);
 }
 
 bool Session::has_room() const {
@@ -362,14 +362,14 @@ Result<std::optional<Answer>> Session::ask(Wish wish) {
         wish.key, wish.priority, {.id = id, .answer = std::move(callback), .flow = flow_});
     if (outcome && !*outcome) {
         view_under_way_ += wish.is_of_view() ? 1U : 0U;
-        under_way_.emplace(id, std::move(wish));
+        under_way_.emplace(id, wish);
     }
     return outcome;
 }
 
 /// True if it was answered at once.
 bool Session::submit_request() {
-    const Wish wish = std::move(waiting_.begin()->second);
+    const Wish wish = waiting_.begin()->second;
     waiting_.erase(waiting_.begin());
     const auto outcome = ask(wish);
     if (!outcome) {
@@ -385,7 +385,7 @@ void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
     if (found == under_way_.end()) {
         return;  // cancelled in the meantime
     }
-    Wish wish = std::move(found->second);
+    Wish wish = found->second;
     under_way_.erase(found);
     if (wish.is_of_view()) {
         --view_under_way_;
@@ -394,7 +394,7 @@ void Session::deliver(WaiterId waiter, const Result<Answer>& result) {
         return;
     }
     if (result && outbox_.full() && std::holds_alternative<ServedChunk>(*result)) {
-        waiting_.emplace(wish.rank, std::move(wish));
+        waiting_.emplace(wish.rank, wish);
         return;
     }
     answer(wish, result);

@@ -225,9 +225,9 @@ void add_series(std::string& svg, const LineSeries& series, std::string_view col
         }
         const std::string at_x = number(x.at(point.x));
         const std::string at_y = number(y.at(point.y));
-        path += (path.empty() ? "M" : "L") + at_x + " " + at_y;
-        marks += "<circle cx=\"" + at_x + "\" cy=\"" + at_y + "\" r=\"3\" fill=\"" +
-                 std::string(color) + "\"/>";
+        path.append(path.empty() ? "M" : "L").append(at_x).append(" ").append(at_y);
+        marks.append("<circle cx=\"").append(at_x).append("\" cy=\"").append(at_y);
+        marks.append("\" r=\"3\" fill=\"").append(color).append("\"/>");
     }
     svg += "<path d=\"" + path + "\" fill=\"none\" stroke-width=\"2\" stroke=\"" +
            std::string(color) + "\"/>" + marks;

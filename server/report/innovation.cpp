@@ -88,14 +88,14 @@ Result<void> write_innovation(Page& page, const ReportOptions& options) {
     }
     const std::vector<double> seeds = distances(of_seeds);
     const std::vector<double> plots = distances(of_plots);
-    BarChart chart{.title = "How different two terrains are (B3, all pairs)",
-                   .y_label = "% of pairs",
-                   .groups = {"0-10 %", "10-20", "20-30", "30-40", "40-50", "50-60", "60-70",
-                              "70-80", "80-90", "90-100"},
-                   .series = {histogram("two seeds", seeds, 10),
-                              histogram("two plots of one world", plots, 10)},
-                   .log_y = false,
-                   .width = 720};
+    const BarChart chart{.title = "How different two terrains are (B3, all pairs)",
+                         .y_label = "% of pairs",
+                         .groups = {"0-10 %", "10-20", "20-30", "30-40", "40-50", "50-60", "60-70",
+                                    "70-80", "80-90", "90-100"},
+                         .series = {histogram("two seeds", seeds, 10),
+                                    histogram("two plots of one world", plots, 10)},
+                         .log_y = false,
+                         .width = 720};
     page.chart("innovation", chart);
     page.paragraph(
         "Distance: share of voxels, solid in at least one of the two, whose main material differs. "
