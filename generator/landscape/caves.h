@@ -131,6 +131,11 @@ class CaveField {
 
     void clear() { counts_.clear(); }
 
+    bool is_empty() const { return counts_.empty(); }
+
+    /// How many each column has; nothing in a field that is empty.
+    std::span<const std::uint8_t> counts() const { return counts_; }
+
     std::span<const CaveGap> gaps(std::size_t i) const {
         if (counts_.empty()) {
             return {};

@@ -259,12 +259,46 @@ void ColumnMaker::begin_row(std::int32_t z) {
     for (std::int32_t i = 0; i < count; ++i) {
         top256[i] = std::max(to_256(banks[i]), 2 * kUnitsPerVoxel);
     }
+    const float* __restrict const folds = sources_.folds.data() + row_.field_at;
+    std::int32_t* __restrict const folded = row_.folded.data();
+    for (std::int32_t i = 0; i < count; ++i) {
+        folded[i] = to_256(folds[i]);
+    }
+    find_crossed();
     row_.soil_from = row_.snow_from = row_.top256;
     if (sources_.constants.has_relief) {
         find_covers(first);
     }
     if (sources_.constants.has_snow && sources_.constants.has_relief) {
         find_snow(first);
+    }
+}
+
+/// Which columns of the row meet a lens, a plane, a cave or an overhang.
+void ColumnMaker::find_crossed() {
+    const auto count = static_cast<std::size_t>(sources_.region.shape.width);
+    std::uint8_t* __restrict const crossed = row_.crossed.data();
+    const std::uint64_t* __restrict const lenses = sources_.region.gap_mask.data() + row_.at;
+    for (std::size_t i = 0; i < count; ++i) {
+        crossed[i] = lenses[i] != 0 ? 1 : 0;
+    }
+    const auto add = [=](const std::uint8_t* __restrict counts, std::size_t first) {
+        for (std::size_t i = 0; i < count; ++i) {
+            crossed[i] |= counts[first + i];
+        }
+    };
+    if (!sources_.fractures.is_empty()) {
+        add(sources_.fractures.counts().data(), row_.field_at);
+    }
+    if (!sources_.caves.is_empty()) {
+        add(sources_.caves.counts().data(), row_.at);
+    }
+    if (!sources_.overhangs.is_empty()) {
+        for (std::size_t i = 0; i < count; ++i) {
+            if (sources_.overhangs.at(row_.at + i) != nullptr) {
+                crossed[i] = 1;
+            }
+        }
     }
 }
 
@@ -508,29 +542,29 @@ Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place&
 std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
                                bool has_flow) {
     const auto column = static_cast<std::size_t>(x + sources_.region.apron);
-    const std::size_t at = row_.at + column;
-    const std::size_t field_at = row_.field_at + column;
-    const auto planes = sources_.fractures.planes(field_at);
-    const bool is_alone = sources_.caves.gaps(at).empty() && sources_.overhangs.at(at) == nullptr;
-    const bool meets_lenses = sources_.region.gap_mask[at] != 0;
     const auto used_by = [&](const Limit* end) {
         return static_cast<std::size_t>(end - limits.data());
     };
-    if (is_alone && !meets_lenses && planes.empty()) {
-        return used_by(write_plain(reserve(limits, used, 1, 0), column,
-                                   to_256(sources_.folds[field_at]), has_flow));
+    const auto plain = [&](std::int32_t moved) {
+        return used_by(write_plain(reserve(limits, used, 1, 0), column, moved, has_flow));
+    };
+    if (row_.crossed[column] == 0) {
+        return plain(row_.folded[column]);
     }
+    const std::size_t at = row_.at + column;
+    const auto planes = sources_.fractures.planes(row_.field_at + column);
     const Place place = place_at(x, z, has_flow);
     find_blocks(place, planes);
     overlays_.clear();
+    const bool meets_lenses = sources_.region.gap_mask[at] != 0;
     for (std::size_t b = 0; meets_lenses && b < block_count_; ++b) {
         find_lenses(place, blocks_[b]);
     }
     const bool has_lenses = !overlays_.is_empty();
     find_sheets(place, planes);
-    if (is_alone && block_count_ == 1 && overlays_.is_empty()) {
-        return used_by(
-            write_plain(reserve(limits, used, 1, 0), column, blocks_[0].moved, has_flow));
+    if (block_count_ == 1 && overlays_.is_empty() && sources_.caves.gaps(at).empty() &&
+        sources_.overhangs.at(at) == nullptr) {
+        return plain(blocks_[0].moved);
     }
     const std::size_t now = used_by(write_crossed(limits, used, place));
     if (has_lenses) {

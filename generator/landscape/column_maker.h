@@ -104,6 +104,7 @@ class ColumnMaker {
                 .soil = static_cast<std::uint16_t>(row_.soil[i])};
     }
 
+    void find_crossed();
     void find_covers(std::ptrdiff_t first);
     void find_snow(std::ptrdiff_t first);
     bool is_by_water(const Place& place) const;
@@ -161,6 +162,8 @@ class ColumnMaker {
         std::array<std::int32_t, kRectangleSideMax> soil_from{};  ///< see Cover
         std::array<std::int32_t, kRectangleSideMax> snow_from{};
         std::array<std::int32_t, kRectangleSideMax> soil{};
+        std::array<std::int32_t, kRectangleSideMax> folded{};   ///< how far folds move the column
+        std::array<std::uint8_t, kRectangleSideMax> crossed{};  ///< 0: layers and covers only
     } row_;
 };
 

@@ -68,6 +68,9 @@ class FractureField {
                 counts_[i]};
     }
 
+    /// How many each column has; nothing in a field that is empty.
+    std::span<const std::uint8_t> counts() const { return counts_; }
+
     bool is_empty() const { return pool_used_ == 0; }
 
   private:

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 namespace terrane {
@@ -72,19 +73,19 @@ std::int32_t made_for(const RectangleShape& shape) {
     return padded_width(shape.width) * shape.length;
 }
 
-/// Without a call: there are many short ones.
+/// Without a call (std::copy_n is memmove, which is one): there are many short ones.
 void copy_short(float* to, const float* from, std::int32_t count) {
     constexpr std::int32_t kHalf = kVectorPad / 2;
     std::int32_t i = 0;
     for (; i + kVectorPad <= count; i += kVectorPad) {
-        std::copy_n(from + i, kVectorPad, to + i);
+        std::memcpy(to + i, from + i, kVectorPad * sizeof(float));
     }
     if (i + kHalf <= count) {
-        std::copy_n(from + i, kHalf, to + i);
+        std::memcpy(to + i, from + i, kHalf * sizeof(float));
         i += kHalf;
     }
     for (; i + 2 <= count; i += 2) {
-        std::copy_n(from + i, 2, to + i);
+        std::memcpy(to + i, from + i, 2 * sizeof(float));
     }
     if (i < count) {
         to[i] = from[i];

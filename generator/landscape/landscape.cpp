@@ -25,6 +25,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 namespace terrane {
@@ -51,8 +52,8 @@ void crop(std::vector<float>& out, const std::vector<float>& raster, const Recta
     for (std::int32_t z = 0; z < to.length; ++z) {
         const float* const row = first + static_cast<std::ptrdiff_t>(z) * from.stride();
         for (std::int32_t x = 0; x < to.width; x += kVectorPad) {
-            std::copy_n(row + x, kVectorPad,
-                        out.data() + static_cast<std::ptrdiff_t>(z) * to.stride() + x);
+            std::memcpy(out.data() + static_cast<std::ptrdiff_t>(z) * to.stride() + x, row + x,
+                        kVectorPad * sizeof(float));
         }
     }
 }

@@ -180,15 +180,15 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
         const float over = input.raw[i] - input.moved[i];
         over_[i] = is_lip ? over : kNothing;
     }
-    dilate(highest_, row_highest_, reach_, over_, field, constants.reach);
+    dilate(highest_, row_highest_, inverse_reach_, over_, field, constants.reach);
     if (!find_ledges(constants, resistance, input, region, terrain, kernels)) {
         return;
     }
-    reach_.resize(size);
-    noise_rectangle(reach_.data(), constants.noise, field, kernels, buffers);
+    inverse_reach_.resize(size);
+    noise_rectangle(inverse_reach_.data(), constants.noise, field, kernels, buffers);
     const auto most = static_cast<float>(constants.reach);
     for (std::size_t i = 0; i < size; ++i) {
-        reach_[i] = most * clamp01(0.6F + 1.6F * reach_[i]) + 0.5F;
+        inverse_reach_[i] = 1.0F / (most * clamp01(0.6F + 1.6F * inverse_reach_[i]) + 0.5F);
     }
     const LayerHeights layers{.first = region.heights.data(), .plane = region.plane_size()};
     overhangs_.assign(shape.padded_size(), {});
@@ -209,16 +209,16 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
                     continue;  // no lip of it would be high enough
                 }
                 const std::size_t begin = center - static_cast<std::size_t>(constants.reach);
-                const float e =
-                    kernels.landscape->nearest_lip({.over = over_.data() + begin,
-                                                    .row_highest = row_highest_.data() + center,
-                                                    .moved = input.moved + begin,
-                                                    .reaches = reach_.data() + begin,
-                                                    .distances = constants.distances.data(),
-                                                    .stride = field.stride(),
-                                                    .reach = constants.reach,
-                                                    .raw_top = raw_top,
-                                                    .moved_here = input.moved[center]});
+                const float e = kernels.landscape->nearest_lip(
+                    {.over = over_.data() + begin,
+                     .row_highest = row_highest_.data() + center,
+                     .moved = input.moved + begin,
+                     .inverse_reaches = inverse_reach_.data() + begin,
+                     .distances = constants.distances.data(),
+                     .stride = field.stride(),
+                     .reach = constants.reach,
+                     .raw_top = raw_top,
+                     .moved_here = input.moved[center]});
                 const float lip = *top + input.moved[center] - 1.5F * e;
                 const float bottom = lip - (0.45F * thickness * (1.0F - e * e) + 1.2F);
                 if (e < 1 && lip > ground[i] + kGapLeast) {

@@ -57,6 +57,8 @@ class OverhangField {
 
     void clear() { overhangs_.clear(); }
 
+    bool is_empty() const { return overhangs_.empty(); }
+
     const Overhang* at(std::size_t i) const {
         return overhangs_.empty() || overhangs_[i].layer < 0 ? nullptr : &overhangs_[i];
     }
@@ -77,7 +79,7 @@ class OverhangField {
 
     std::vector<Overhang> overhangs_;
     std::vector<float> over_;
-    std::vector<float> reach_;
+    std::vector<float> inverse_reach_;  ///< 1 / (reach + .5)
     std::vector<float> highest_;
     std::vector<float> row_highest_;
     std::vector<float> raw_top_;       ///< raw height of the layers so far

@@ -8,6 +8,7 @@
 #include "generator/terrain/world.h"
 #include "tests/bench/bench_world.h"
 #include "tests/bench/ratios.h"
+#include "tests/bench/thread_clock.h"
 
 #include <benchmark/benchmark.h>
 
@@ -16,7 +17,6 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
-#include <ctime>
 #include <iterator>
 #include <memory>
 #include <span>
@@ -67,12 +67,6 @@ struct Chain {
         return bytes ? bytes->size() : 0;
     }
 };
-
-double thread_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// The whole chain over one stack after another; each stage's seconds a stack are a counter.
 void cold(benchmark::State& state, const std::string& name) {

@@ -17,9 +17,9 @@ float absolute(float x) {
     return __builtin_fabsf(x);
 }
 
-/// Sine of -0.5..0.5 turns.
-float sine(float t) {
-    const float y = 8.0F * t - 16.0F * t * absolute(t);
+/// Sine of -2..2 quarter turns.
+float sine(float q) {
+    const float y = (q + q) - q * absolute(q);
     return 0.225F * (y * absolute(y) - y) + y;
 }
 
@@ -44,10 +44,9 @@ void add_stripes(Stripes& stripes, const ErosionRow& row, std::int32_t first, st
         const float rest = 1.0F - (vx * vx + vz * vz) * (1.0F / 1.5625F);
         const float k = rest > 0.0F ? rest * rest : 0.0F;
         const float phase = 0.75F * (vx * side_x[i] + vz * side_z[i]);
-        // Below one turn where k is not 0: a shift by half a turn at most each way.
-        const float turn = phase + ((phase > 0.5F ? -1.0F : 0.0F) + (phase < -0.5F ? 1.0F : 0.0F));
-        stripes.cosine[i] += k * sine(0.25F - absolute(turn));
-        stripes.sine[i] += k * sine(turn);
+        const float quarters = 4.0F * (phase - __builtin_rintf(phase));
+        stripes.cosine[i] += k * sine(1.0F - absolute(quarters));
+        stripes.sine[i] += k * sine(quarters);
         stripes.weight[i] += k;
     }
 }
@@ -283,13 +282,13 @@ float nearest_lip(const LipPlace& place) {
         }
         const float* __restrict const over = place.over + row;
         const float* __restrict const moved = place.moved + row;
-        const float* __restrict const reaches = place.reaches + row;
+        const float* __restrict const inverse_reaches = place.inverse_reaches + row;
         const float* __restrict const distance = place.distances + (z < 0 ? -z : z) * kBlock;
         for (std::int32_t i = 0; i < kBlock; ++i) {
             const bool is_lip =
                 static_cast<int>(over[i] >= place.raw_top) &
                 static_cast<int>(absolute(moved[i] - place.moved_here) <= 0.4F * distance[i]);
-            const float share = is_lip ? distance[i] / reaches[i] : 1.0F;
+            const float share = is_lip ? distance[i] * inverse_reaches[i] : 1.0F;
             nearest[i] = share < nearest[i] ? share : nearest[i];
         }
     }

@@ -130,7 +130,7 @@ struct LipPlace {
     const float* over = nullptr;
     const float* row_highest = nullptr;  ///< of the row, at its middle
     const float* moved = nullptr;
-    const float* reaches = nullptr;
+    const float* inverse_reaches = nullptr;
     const float* distances = nullptr;  ///< kVectorPad for each row from the middle's on, far ones
                                        ///< where nothing is looked for
     std::int64_t stride = 0;
