@@ -19,7 +19,6 @@
 namespace terrane {
 namespace {
 
-constexpr float kBank = 1.5F;        ///< half widths: banks reach so far
 constexpr float kMeets = 3.0F;       ///< half widths: how far a river's level counts for others
 constexpr float kLakeWidths = 2.5F;  ///< a sink's lake, in half widths of its river
 constexpr float kFreeboard = 1.4F;   ///< voxels from the banks down to the water
@@ -94,6 +93,21 @@ float channel_height(const NearReach& near, float ground) {
            (ground - near.level + 1.0F) * smooth_step(0, 1, (d - w) / (out_of(w) - w));
 }
 
+/// Where the land lies lower than a river beside it, it slopes up to the river's banks. Each reach
+/// looks at the land as it was; what is raised in the bed of another one is cut again.
+void raise_low_ground(float* ground, ChannelRasters& out) {
+    out.raised.clear();
+    for (const NearReach& near : out.near) {
+        const float bank = near.level - 1.0F;
+        if (near.distance >= near.half_width && ground[near.column] < bank) {
+            out.raised.push_back({near.column, channel_height(near, ground[near.column])});
+        }
+    }
+    for (const auto& [column, height] : out.raised) {
+        ground[column] = std::max(ground[column], height);
+    }
+}
+
 }  // namespace
 
 void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
@@ -166,7 +180,6 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
     const std::size_t size = shape.padded_size();
     out.water.assign(size, kNoWater);
     out.nearness.assign(size, kFar);
-    out.near_count.assign(size, 0);
     out.weight.assign(size, 0);
     out.near.clear();
     if (relief.is_smooth && constants.rivers > 0) {
@@ -175,7 +188,6 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
             const std::size_t i = near.column;
             const float nearness = near.distance / near.half_width;
             out.nearness[i] = std::min(out.nearness[i], nearness);
-            out.near_count[i] += nearness < kBank ? 1.0F : 0.0F;
             if (nearness < kMeets) {
                 // Where rivers meet, a mean that passes from one level to the other without a step:
                 // over more than their width, or it would be a weir.
@@ -185,14 +197,10 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
                 out.weight[i] += weight;
             }
         }
+        raise_low_ground(ground, out);
         for (const NearReach& near : out.near) {
             const std::size_t i = near.column;
-            const float height = channel_height(near, ground[i]);
-            const bool is_bank =
-                near.distance < kBank * near.half_width && out.near_count[i] <= 1.0F;
-            if (height < ground[i] || is_bank) {
-                ground[i] = height;
-            }
+            ground[i] = std::min(ground[i], channel_height(near, ground[i]));
         }
     }
     if (out.near.empty() && constants.sea == kNoWater) {

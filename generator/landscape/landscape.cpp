@@ -333,6 +333,7 @@ void Landscape::build(Region& region, const TerrainConstants& constants, PlotCac
     cut_channels(ground_.data(), channels_, constants_.channels, relief_, field_builder_.rivers(),
                  shape, kernels);
     raise_banks(region);
+    overhangs_.break_off(banks_.data());
     if (shape.step == 1 && constants_.caves.cell > 0) {
         caves_.build(constants_.caves, cave_graph_, banks_.data(), shape, kernels, noise_);
     } else {

@@ -26,6 +26,7 @@ constexpr float kHard = 1.3F;
 constexpr float kSoft = 0.9F;
 constexpr float kThickLeast = 4;    ///< voxels
 constexpr float kGapLeast = 1.25F;  ///< voxels
+constexpr float kCutMost = 0.5F;    ///< voxels
 constexpr float kNothing = -1e9F;
 
 /// to[i] = the greatest of from[i], from[i + stride], ... from[i + 2 * reach * stride]: windows of
@@ -222,13 +223,24 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
                 const float lip = *top + input.moved[center] - 1.5F * e;
                 const float bottom = lip - (0.45F * thickness * (1.0F - e * e) + 1.2F);
                 if (e < 1 && lip > ground[i] + kGapLeast) {
-                    overhangs_[i] = {.bottom = bottom < ground[i] + kGapLeast ? ground[i] : bottom,
+                    overhangs_[i] = {.bottom = bottom,
                                      .top = lip,
+                                     .ground = ground[i],
                                      .layer = static_cast<std::int32_t>(ledge)};
                     break;
                 }
             }
         }
+    }
+}
+
+void OverhangField::break_off(const float* ground) {
+    for (std::size_t i = 0; i < overhangs_.size(); ++i) {
+        Overhang& one = overhangs_[i];
+        if (one.ground - ground[i] > kCutMost) {
+            one.layer = -1;
+        }
+        one.bottom = one.bottom < ground[i] + kGapLeast ? ground[i] : one.bottom;
     }
 }
 

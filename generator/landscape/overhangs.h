@@ -44,6 +44,7 @@ struct OverhangInput {
 struct Overhang {
     float bottom = 0;  ///< voxels
     float top = 0;
+    float ground = 0;         ///< under it, while it was found
     std::int32_t layer = -1;  ///< -1: none here
 };
 
@@ -56,6 +57,9 @@ class OverhangField {
                const float* ground, const RowKernels& kernels, NoiseBuffers& buffers);
 
     void clear() { overhangs_.clear(); }
+
+    /// After channels and funnels: where they cut into the ground, its ledge has broken off.
+    void break_off(const float* ground);
 
     bool is_empty() const { return overhangs_.empty(); }
 
