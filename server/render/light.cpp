@@ -61,12 +61,19 @@ double sun_over_land(SceneReader& reader, glm::dvec3 from, glm::dvec3 to_sun, do
         if (at.y > bound) {
             break;
         }
+        const double half_shadow = kPenumbra * t + 0.05 * step;
+        if (const double clear =
+                clear_way(reader, {.origin = from, .direction = to_sun}, t, half_shadow)) {
+            t += clear;
+            continue;
+        }
         const double above = at.y - reader.top_at(at.x, at.z);
-        seen = std::min(seen, 0.5 + 0.5 * above / (kPenumbra * t + 0.05 * step));
+        seen = std::min(seen, 0.5 + 0.5 * above / half_shadow);
         if (seen <= 0) {
             return 0;
         }
-        t += std::clamp(0.5 * above, 0.5 * step + 0.01 * t, 24.0);
+        // Thin walls and needles are not to be stepped over.
+        t += std::min(std::max(0.5 * above, 0.5 * step), step + 0.004 * t);
     }
     return seen * seen * (3 - 2 * seen);
 }
@@ -79,7 +86,10 @@ double sun_seen(SceneReader& reader, const Light& light, const Hit& hit, double 
     if (!hit.cut && from.y > reader.top_at(from.x, from.z) - 0.5) {
         return sun_over_land(reader, from, light.to_sun, step);
     }
-    return trace(reader, {.origin = from, .direction = light.to_sun}, kShadowSight) ? 0 : 1;
+    // Walls are uneven by half a column, being made of columns: that casts no shadow.
+    const glm::dvec3 before = hit.point + hit.normal * (0.8 * step);
+    const glm::dvec3 origin = hit.cut || reader.density_at(before) > 0 ? from : before;
+    return trace(reader, {.origin = origin, .direction = light.to_sun}, kShadowSight) ? 0 : 1;
 }
 
 /// Share of the sky that is not hidden by the land around: the mean over directions of what the

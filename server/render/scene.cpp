@@ -79,7 +79,7 @@ void Scene::add_level(std::int64_t x_first, std::int64_t z_first, std::int64_t w
          .slots = std::make_unique<Slot[]>(static_cast<std::size_t>(width * length))});
 }
 
-PlacedTile Scene::tile_at(double x, double z, StackGenerator& generator) const {
+PlacedTile Scene::tile_at(double x, double z, StackGenerator& generator, RiverMap& rivers) const {
     // The coarsest tile over the point that begins far enough out: all rays agree on it.
     auto lod = static_cast<std::int32_t>(levels_.size()) - 1;
     while (lod > 0 && tile_distance(tile_index(x, lod), tile_index(z, lod), lod) < begin_of(lod)) {
@@ -102,20 +102,21 @@ PlacedTile Scene::tile_at(double x, double z, StackGenerator& generator) const {
     std::call_once(slot.once, [&] {
         const std::int64_t columns = std::int64_t{kTileCells} << lod;
         slot.tile = std::make_unique<const SceneTile>(make_scene_tile(
-            *world_, generator,
+            *world_, generator, rivers,
             {.x = origin_.x + tile_x * columns, .z = origin_.z + tile_z * columns}, lod));
     });
     placed.tile = slot.tile.get();
     return placed;
 }
 
-SceneReader::SceneReader(const Scene& scene) : scene_(&scene), generator_(scene.world()) {}
+SceneReader::SceneReader(const Scene& scene)
+    : scene_(&scene), generator_(scene.world()), rivers_(scene.world()) {}
 
 const PlacedTile& SceneReader::tile_at(double x, double z) {
     const double side = last_.step * kTileCells;
     if (last_.tile == nullptr || x < last_.x0 || z < last_.z0 || x >= last_.x0 + side ||
         z >= last_.z0 + side) {
-        last_ = scene_->tile_at(x, z, generator_);
+        last_ = scene_->tile_at(x, z, generator_, rivers_);
     }
     return last_;
 }

@@ -3,6 +3,7 @@
 // origin, a column next to the eye, so that pictures far out are as sharp as at (0, 0).
 #pragma once
 
+#include "generator/landscape/river_map.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/world.h"
 #include "protocol/base/coords.h"
@@ -55,8 +56,9 @@ class Scene {
     /// With a block, nothing else is drawn and all of it is level 0.
     Scene(const World& world, ColumnPos origin, std::optional<ColumnBlock> block);
 
-    /// The tile over a point, by the caller's generator if it is not there yet. Any thread.
-    PlacedTile tile_at(double x, double z, StackGenerator& generator) const;
+    /// The tile over a point, by the caller's generator and rivers if it is not there yet. Any
+    /// thread.
+    PlacedTile tile_at(double x, double z, StackGenerator& generator, RiverMap& rivers) const;
 
     const World& world() const { return *world_; }
 
@@ -112,6 +114,7 @@ class SceneReader {
   private:
     const Scene* scene_;
     StackGenerator generator_;
+    RiverMap rivers_;
     PlacedTile last_;
 };
 

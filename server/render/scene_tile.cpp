@@ -1,6 +1,8 @@
 #include "server/render/scene_tile.h"
 
+#include "generator/landscape/river_map.h"
 #include "generator/terrain/generate_stack.h"
+#include "generator/terrain/noise.h"
 #include "generator/terrain/world.h"
 #include "generator/volume/color.h"
 #include "generator/volume/limit.h"
@@ -273,10 +275,33 @@ void fill_highest(SceneTile& tile) {
     }
 }
 
+/// Rivers narrower than a cell would be dashes.
+void color_rivers(SceneTile& tile, RiverMap& rivers, ColumnPos first) {
+    // What water reflects and what it is, seen from far and aslant.
+    constexpr LinearColor kFarWater = {.r = 0.12F, .g = 0.21F, .b = 0.30F};
+    const std::int64_t step = std::int64_t{1} << tile.lod;
+    const auto half = static_cast<float>(step) * 0.5F;
+    const RectangleShape shape{.x0 = first.x,
+                               .z0 = first.z,
+                               .width = kTileCells + 1,
+                               .length = kTileCells + 1,
+                               .step = step};
+    const std::span<const float> distances = rivers.distances(shape, half);
+    for (std::int32_t v = 0; v <= kTileCells; ++v) {
+        for (std::int32_t u = 0; u <= kTileCells; ++u) {
+            const std::size_t i = SceneTile::index_of(u, v);
+            if (distances[static_cast<std::size_t>(v * shape.stride() + u)] < half &&
+                waters_of(tile, i).empty()) {
+                tile.top_colors[i] = kFarWater;
+            }
+        }
+    }
+}
+
 }  // namespace
 
-SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnPos first,
-                          std::int32_t lod) {
+SceneTile make_scene_tile(const World& world, StackGenerator& generator, RiverMap& rivers,
+                          ColumnPos first, std::int32_t lod) {
     constexpr std::size_t kColumns = std::size_t{kTileCells + 1} * (kTileCells + 1);
     SceneTile tile;
     tile.lod = lod;
@@ -318,6 +343,7 @@ SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnP
     tile.water_begin.push_back(static_cast<std::uint32_t>(tile.waters.size()));
     fill_highest(tile);
     if (lod > 0) {
+        color_rivers(tile, rivers, first);
         tile.set = {};
         if (!tile.is_landscape) {  // water covers the ground at every level
             tile.covers = tile.tops;

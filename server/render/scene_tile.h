@@ -6,6 +6,7 @@
 // steps. Tiles above level 0 know only their top surface.
 #pragma once
 
+#include "generator/landscape/river_map.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/world.h"
 #include "generator/volume/limit.h"
@@ -71,9 +72,9 @@ struct SceneTile {
 };
 
 /// Makes the tile whose column (0, 0) is `first`. A tile beyond the world's edge is empty:
-/// kNoHeight everywhere.
-SceneTile make_scene_tile(const World& world, StackGenerator& generator, ColumnPos first,
-                          std::int32_t lod);
+/// kNoHeight everywhere. Above level 0, rivers narrower than a cell are coloured as wide as one.
+SceneTile make_scene_tile(const World& world, StackGenerator& generator, RiverMap& rivers,
+                          ColumnPos first, std::int32_t lod);
 
 /// Above 0 inside the solid; the vertical distance to the nearest surface, in voxels.
 double density_at(const SceneTile& tile, TilePoint point);

@@ -36,4 +36,8 @@ enum class Sight : std::uint8_t { solid, solid_and_water };
 std::optional<Hit> trace(SceneReader& reader, const Ray& ray, double distance_max,
                          Sight sight = Sight::solid);
 
+/// How far a ray that does not fall goes on from distance `t` over land that lies more than
+/// `margin` voxels below it; 0 if that is not known.
+double clear_way(SceneReader& reader, const Ray& ray, double t, double margin);
+
 }  // namespace terrane
