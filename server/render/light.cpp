@@ -23,6 +23,7 @@ constexpr glm::dvec3 kGlow = {1.0, 0.75, 0.45};
 // Tangent of the half shadow's width: some six times the real sun's, which looks right at the size
 // of a voxel.
 constexpr double kPenumbra = 0.03;
+constexpr double kSteep = 0.35;        // upright part of a normal: on a wall the land has no height
 constexpr double kShadowSight = 1500;  // voxels; no hill throws a longer shadow that matters
 
 /// A random number in 0..1 for each point of a lattice, smooth in between.
@@ -83,11 +84,11 @@ double sun_seen(SceneReader& reader, const Light& light, const Hit& hit, double 
         return 0;
     }
     const glm::dvec3 from = hit.point + hit.normal * (0.1 * step);
-    if (!hit.cut && from.y > reader.top_at(from.x, from.z) - 0.5) {
+    if (!hit.cut && hit.normal.y > kSteep && from.y > reader.top_at(from.x, from.z) - 0.5) {
         return sun_over_land(reader, from, light.to_sun, step);
     }
-    // Walls are uneven by half a column, being made of columns: that casts no shadow.
-    const glm::dvec3 before = hit.point + hit.normal * (0.8 * step);
+    // Walls are uneven by a column, being made of columns: that casts no shadow.
+    const glm::dvec3 before = hit.point + hit.normal * (1.5 * step);
     const glm::dvec3 origin = hit.cut || reader.density_at(before) > 0 ? from : before;
     return trace(reader, {.origin = origin, .direction = light.to_sun}, kShadowSight) ? 0 : 1;
 }
