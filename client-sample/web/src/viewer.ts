@@ -115,6 +115,7 @@ export class Viewer {
         this.map = new MiniMap((x, z) => this.jump(x, undefined, z));
         this.shell.side.append(this.map.root, this.shell.fields, this.panel.root);
         this.shell.press('format', this.format === 'columns', this.format === 'columns' ? 'Columns' : 'Draco');
+        this.shell.press('caves', this.showsCaves);
         this.connectControls();
         this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.receive(data);
         window.addEventListener('resize', () => {
@@ -412,6 +413,7 @@ export class Viewer {
     private toggleCaves(): void {
         this.showsCaves = !this.showsCaves;
         this.world?.tiles.setCaves(this.showsCaves);
+        this.shell.press('caves', this.showsCaves);
         this.shell.say(this.showsCaves ? 'caves are drawn' : 'caves are left out: what is under much rock');
         this.stage.shadowsChanged();
         this.needsFrame = true;

@@ -321,10 +321,13 @@ test('caves can be left out', async () => {
         .reduce((sum, { mesh }) => sum + Math.min(mesh.geometry.drawRange.count, mesh.geometry.index.count), 0));
     await settle(page);
     const all = await drawn();
+    const button = page.getByRole('button', { name: 'Caves' });
     await page.keyboard.press('v');
     assert.ok((await drawn()) < all);
-    await page.keyboard.press('v');
+    assert.equal(await button.getAttribute('aria-pressed'), 'false');
+    await button.click();
     assert.equal(await drawn(), all);
+    assert.equal(await button.getAttribute('aria-pressed'), 'true');
     await go(page, NEAR_GROUND);
     noFaults();
 });

@@ -29,6 +29,7 @@ const ICONS = {
     cut: '<path d="M3 6l7-3 7 3v8l-7 3-7-3z"/><path d="M10 3v14"/><path d="M10 8l7-2M10 12l7-2"/>',
     xray: '<circle cx="10" cy="10" r="7"/><path d="M6 12c2-3 3 0 5-3s2-1 3-2"/>',
     probe: '<path d="M10 2v16"/><path d="M6 5h8v10H6z"/><path d="M6 8h8M6 11h8"/>',
+    caves: '<path d="M2 16c1-7 4-12 8-12s7 5 8 12M7 16c0-4 1-6 3-6s3 2 3 6"/>',
     format: '<path d="M3 6h11l-3-3M17 14H6l3 3"/>',
     picture: '<rect x="2.5" y="5" width="15" height="11" rx="2"/><circle cx="10" cy="10.5" r="3"/><path d="M7 5l1-2h4l1 2"/>',
     panel: '<path d="M3 16V9M8 16V4M13 16v-5M18 16V7"/>',
@@ -47,7 +48,7 @@ export class Shell {
     private readonly note = element('div', 'glass note');
     private readonly tools = element('div', 'glass tools');
     private readonly flow: HTMLButtonElement;
-    private readonly buttons: Record<'mode' | 'cut' | 'xray' | 'probe' | 'format', HTMLButtonElement>;
+    private readonly buttons: Record<'mode' | 'cut' | 'xray' | 'probe' | 'caves' | 'format', HTMLButtonElement>;
     private readonly cross = element('div', 'cross');
     private token: HTMLInputElement | undefined;
     private noteTimer: ReturnType<typeof setTimeout> | undefined;
@@ -67,13 +68,14 @@ export class Shell {
             cut: button('Cut', ICONS.cut, 'X', actions.cut),
             xray: button('X-ray', ICONS.xray, 'R', actions.xray),
             probe: button('Probe', ICONS.probe, 'P', actions.probe),
+            caves: button('Caves', ICONS.caves, 'V', actions.caves),
             format: button('Draco', ICONS.format, 'T', actions.format),
         };
         const split = () => element('div', 'split');
         const toggle = (target: HTMLElement) => () => (target.hidden = !target.hidden);
         bar.append(
             this.buttons.mode, split(),
-            this.buttons.cut, this.buttons.xray, this.buttons.probe, split(),
+            this.buttons.cut, this.buttons.xray, this.buttons.probe, this.buttons.caves, split(),
             this.buttons.format,
             button('Picture', ICONS.picture, 'O', actions.picture),
             button('Figures', ICONS.panel, 'G', toggle(this.side)),
