@@ -10,6 +10,8 @@
 //
 // A dilation of the lips, so that everything hangs together with what it grows from. The air below
 // goes down to the ground; a gap under kGapLeast is filled. One overhang a column, level 0 only.
+// Lips are told by what the land was before rivers and sinkholes: where these have cut more than
+// kCutMost into the ground there is none, or it would hang in the air in front of its hill.
 #pragma once
 
 #include "generator/landscape/resistance.h"

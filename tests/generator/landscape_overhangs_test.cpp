@@ -57,10 +57,11 @@ bool meet(const Interval& a, const Interval& b) {
 std::vector<std::int32_t> columns_to_ground(const Ledges& ledges, std::int32_t most) {
     std::vector<std::int32_t> distance(ledges.ledge.size(), most);
     const auto neighbours = [](std::size_t c) {
-        return std::array<std::size_t, 4>{c - 1, c + 1, c - kWidth, c + kWidth};
+        return std::array<std::size_t, 8>{c - kWidth - 1, c - kWidth, c - kWidth + 1, c - 1, c + 1,
+                                          c + kWidth - 1, c + kWidth, c + kWidth + 1};
     };
     const auto for_each_ledge = [&](auto&& use) {
-        for (std::size_t c = kWidth; c + kWidth < ledges.ledge.size(); ++c) {
+        for (std::size_t c = kWidth + 1; c + kWidth + 1 < ledges.ledge.size(); ++c) {
             if (ledges.ledge[c].high != 0) {
                 use(c);
             }
@@ -122,7 +123,8 @@ TEST_P(LandscapeOverhangs, HangOnTheGroundBesideThem) {
 INSTANTIATE_TEST_SUITE_P(Places, LandscapeOverhangs,
                          ::testing::Values(Place{"canyon", -800, 100}, Place{"canyon", 1200, 100},
                                            Place{"range", -100, 100}, Place{"karst", -100, 100},
-                                           Place{"fold", -100, 100}),
+                                           Place{"fold", -100, 100}, Place{"alpine", -100, 100},
+                                           Place{"coast", -100, 100}),
                          [](const auto& place) {
                              return std::string(place.param.world) + std::to_string(place.index);
                          });
