@@ -94,8 +94,9 @@ void RowPerlin::fold_row(std::int32_t y, std::int32_t z) {
     const auto columns = static_cast<std::size_t>(x_.cells) + 1;
     const auto rows = static_cast<std::size_t>(y_.cells) + 1;
     const auto at = [&](std::size_t x, int dy, int dz) {
-        const std::size_t row = static_cast<std::size_t>(y_.cell[j] + dy);
-        const std::size_t plane = static_cast<std::size_t>(z_.cell[k] + dz);
+        const std::size_t row = static_cast<std::size_t>(y_.cell[j]) + static_cast<std::size_t>(dy);
+        const std::size_t plane =
+            static_cast<std::size_t>(z_.cell[k]) + static_cast<std::size_t>(dz);
         return &gradients_[3 * ((plane * rows + row) * columns + x)];
     };
     const std::array<float, 4> weight = {(1 - v) * (1 - w), v * (1 - w), (1 - v) * w, v * w};

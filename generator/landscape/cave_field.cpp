@@ -105,7 +105,7 @@ void CaveField::add_tube(const Tube& tube, const float* ground, const RectangleS
     for (std::int32_t row = rows.first; row < rows.end; ++row) {
         const Touched columns = reached[static_cast<std::size_t>(row)];
         for (std::int32_t column = columns.first; column < columns.end; ++column) {
-            const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+            const std::size_t i = shape.index(column, row);
             if (tube_lid_[i] > tube_floor_[i] && tube_floor_[i] < ground[i]) {
                 add(i, {.floor = tube_floor_[i], .lid = tube_lid_[i]});
             }
@@ -154,7 +154,7 @@ void CaveField::build(const CaveConstants& constants, const CaveGraph& graph, co
         make_ready();
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
             for (std::int32_t column = columns.first; column < columns.end; ++column) {
-                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+                const std::size_t i = shape.index(column, row);
                 const auto x = static_cast<float>(shape.x0 + column - doline.x);
                 const auto z = static_cast<float>(shape.z0 + row - doline.z);
                 const float r = doline.radius * (1.0F + 0.25F * rough_[i] + 0.15F * ragged_[i]);
@@ -189,7 +189,7 @@ void cut_funnels(float* ground, const float* allowed, const CaveGraph& graph,
         const Touched rows = touched(doline.z, -most, most, shape.z0, shape.length);
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
             for (std::int32_t column = columns.first; column < columns.end; ++column) {
-                const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+                const std::size_t i = shape.index(column, row);
                 const auto x = static_cast<float>(shape.x0 + column - doline.x);
                 const auto z = static_cast<float>(shape.z0 + row - doline.z);
                 const float out = std::sqrt(x * x + z * z) - doline.radius;

@@ -53,7 +53,7 @@ Wander wander_of(const ReliefRasters& relief, const RectangleShape& shape) {
     Wander wander;
     for (std::int32_t row = 0; row < shape.length; ++row) {
         for (std::int32_t column = 0; column < shape.width; ++column) {
-            const auto i = static_cast<std::size_t>(row * shape.stride() + column);
+            const std::size_t i = shape.index(column, row);
             const float x = relief.wander_x[i];
             const float z = relief.wander_z[i];
             wander = {.x_min = std::min(wander.x_min, x),
@@ -135,7 +135,7 @@ void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
         std::array<float, kRectangleSideMax + kVectorPad> square;
         std::array<float, kRectangleSideMax + kVectorPad> along;
         for (std::int32_t row = rows.first; row < rows.end; ++row) {
-            const auto first = static_cast<std::size_t>(row * shape.stride() + columns.first);
+            const std::size_t first = shape.index(columns.first, row);
             const std::int32_t count = columns.end - columns.first;
             // From the reach, not from the region: the same bits for every region.
             kernels.landscape->near_reach(

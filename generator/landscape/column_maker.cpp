@@ -541,7 +541,8 @@ Limit* ColumnMaker::write_crossed(Limits& limits, std::size_t used, const Place&
 
 std::size_t ColumnMaker::write(Limits& limits, std::size_t used, std::int32_t x, std::int32_t z,
                                bool has_flow) {
-    const auto column = static_cast<std::size_t>(x + sources_.region.apron);
+    const std::size_t column =
+        static_cast<std::size_t>(x) + static_cast<std::size_t>(sources_.region.apron);
     const auto used_by = [&](const Limit* end) {
         return static_cast<std::size_t>(end - limits.data());
     };

@@ -175,7 +175,7 @@ void FractureField::build(const FractureConstants& constants, const RectangleSha
         const auto step = static_cast<float>(shape.step);
         for (std::int32_t row = 0; row < shape.length; ++row) {
             const float z = z0 + static_cast<float>(row) * step;
-            const auto first = static_cast<std::size_t>(row * shape.stride());
+            const std::size_t first = shape.index(0, row);
             Columns columns{.first = 0, .end = shape.width};
             columns = columns_within(columns, x0 * fracture.along_x + z * fracture.along_z,
                                      step * fracture.along_x, fracture.length + 1);

@@ -108,7 +108,7 @@ void Landscape::build_fields(const Region& region, const RowKernels& kernels) {
     if (!fractures_.is_empty()) {
         for (std::int32_t z = 0; z < field_.length; ++z) {
             for (std::int32_t x = 0; x < field_.width; ++x) {
-                const auto i = static_cast<std::size_t>(z * field_.stride() + x);
+                const std::size_t i = field_.index(x, z);
                 const auto planes = fractures_.planes(i);
                 if (!planes.empty()) {
                     moved_[i] += displacement_at(planes, fields_->raw[i]);
@@ -135,7 +135,7 @@ void Landscape::build_ground(Region& region, const TerrainConstants& constants,
         const float* const top = layers.first + (layer_count - 1) * layers.plane;
         for (std::int32_t z = 0; z < shape.length; ++z) {
             for (std::int32_t x = 0; x < shape.width; ++x) {
-                const auto i = static_cast<std::size_t>(z * shape.stride() + x);
+                const std::size_t i = shape.index(x, z);
                 const std::size_t at = field_index(shape, x, z);
                 const float folded = top[i] + fields_->folds[at];
                 ground_[i] =
@@ -225,7 +225,7 @@ void Landscape::find_shown(const Region& region) {
     buried_.assign(region.plane_size(), INT32_MAX);
     const bool has_planes = !fractures_.is_empty();
     for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
-        const auto first = static_cast<std::size_t>(z * shape.stride());
+        const std::size_t first = shape.index(0, z);
         const std::size_t at = field_index(shape, 0, z);
         // The most that any block of a column was lowered and lifted by.
         std::array<float, kRectangleSideMax> lowered;

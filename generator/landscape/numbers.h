@@ -11,7 +11,7 @@
 namespace terrane {
 
 /// What a landscape's hashes are for; beside `Tag`, which holds the stack's.
-enum class LandscapeTag : std::uint64_t {
+enum class LandscapeTag : std::uint8_t {
     potential = 16,
     river_node,
     mountains,

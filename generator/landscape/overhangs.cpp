@@ -78,11 +78,12 @@ static_assert(2 * static_cast<std::int32_t>(kOverhangMax) < kVectorPad, "a row o
 /// Distances to columns so far away, a block of them for each row from the middle's on.
 std::vector<float> lip_distances(std::int32_t reach) {
     constexpr float kFar = 1e9F;
-    std::vector<float> distances(static_cast<std::size_t>((reach + 1) * kVectorPad), kFar);
-    for (std::int32_t z = 0; z <= reach; ++z) {
-        for (std::int32_t x = -reach; x <= reach; ++x) {
-            distances[static_cast<std::size_t>(z * kVectorPad + reach + x)] =
-                std::sqrt(static_cast<float>(x * x + z * z));
+    std::vector<float> distances((static_cast<std::size_t>(reach) + 1) * kVectorPad, kFar);
+    std::size_t row = 0;
+    for (std::int32_t z = 0; z <= reach; ++z, row += kVectorPad) {
+        std::size_t at = row;
+        for (std::int32_t x = -reach; x <= reach; ++x, ++at) {
+            distances[at] = std::sqrt(static_cast<float>(x * x + z * z));
         }
     }
     return distances;
@@ -134,9 +135,8 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
         std::uint32_t any_here = 0;
         std::uint32_t any_later = 0;  // some lip is higher: layers above may lean out
         for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
-            const auto first = static_cast<std::size_t>(z * shape.stride());
-            const auto center =
-                static_cast<std::size_t>((z + margin_z) * field.stride() + margin_x);
+            const std::size_t first = shape.index(0, z);
+            const std::size_t center = field.index(margin_x, z + margin_z);
             const LedgeSeen seen =
                 kernels.landscape->ledge({.lean = lean_.data() + first + 1,
                                           .highest = highest_.data() + center + 1,
@@ -197,9 +197,8 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
     const auto margin_z = static_cast<std::int32_t>(shape.z0 - field.z0);
     for (std::int32_t z = 1; z + 1 < shape.length; ++z) {
         for (std::int32_t x = 1; x + 1 < shape.width; ++x) {
-            const auto i = static_cast<std::size_t>(z * shape.stride() + x);
-            const auto center =
-                static_cast<std::size_t>((z + margin_z) * field.stride() + x + margin_x);
+            const std::size_t i = shape.index(x, z);
+            const std::size_t center = field.index(x + margin_x, z + margin_z);
             for (std::uint32_t leans = lean_[i]; leans != 0; leans &= leans - 1) {
                 const auto l = static_cast<std::size_t>(std::countr_zero(leans));
                 const std::size_t ledge = constants.ledges[l];

@@ -402,7 +402,7 @@ void ReliefBuilder::smooth(ReliefRasters& out, const Axis& x, const Axis& z,
     mixed_.resize(std::max(mixed_.size(), lines * (kValues + 1)));
     for (std::int32_t row = 0; row < shape.length; ++row) {
         mix_lattice_row(x, z, row);
-        const auto first = static_cast<std::size_t>(row * shape.stride());
+        const std::size_t first = shape.index(0, row);
         const std::array<float*, kValues + 1> to = {
             out.ground.data() + first,   out.river.data() + first,    out.crest.data() + first,
             out.mountain.data() + first, out.wander_x.data() + first, out.wander_z.data() + first,

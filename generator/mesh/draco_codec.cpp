@@ -136,13 +136,14 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     const auto traversal = in.fixed<std::uint8_t>();
     const auto vertices = in.varint();
     const auto triangles = in.varint();
-    if (!magic || std::memcmp(magic->data(), "DRACO", 5) != 0 || !flags || !triangles) {
+    if (!magic || !version || !geometry || !method || !flags || !traversal || !vertices ||
+        !triangles || std::memcmp(magic->data(), "DRACO", 5) != 0) {
         return fail(ErrorCode::malformed, "draco: the header is cut short or not Draco's");
     }
     if (*version != (draco::kDracoMeshBitstreamVersionMajor | draco::kDracoMeshBitstreamVersionMinor
                                                                   << 8) ||
         *geometry != draco::TRIANGULAR_MESH || *method != draco::MESH_EDGEBREAKER_ENCODING ||
-        *flags != 0 || !traversal) {
+        *flags != 0) {
         return fail(ErrorCode::malformed, "draco: not an edgebreaker mesh of version 2.2");
     }
     if (*triangles > kTrianglesMax || *triangles > bytes.size() * kTrianglesPerByteMax ||

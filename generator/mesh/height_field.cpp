@@ -124,20 +124,19 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
     out.clear();
     find_palette_shades(shades_, stack.palette, material_colors_);
     const std::int32_t vertices = stack.side + 1;
-    const std::int32_t row = vertices + 1;  // of tops, which begin at column -1
-    tops256_.resize(static_cast<std::size_t>(row * row));
+    const std::size_t row = static_cast<std::size_t>(vertices) + 1;  // of tops, from column -1 on
+    tops256_.resize(row * row);
+    std::size_t at = 0;
     for (std::int32_t z = -1; z < vertices; ++z) {
-        for (std::int32_t x = -1; x < vertices; ++x) {
+        for (std::int32_t x = -1; x < vertices; ++x, ++at) {
             const Limit& top = top_of(stack.columns.column(x, z), stack.palette);
-            const auto at = static_cast<std::size_t>((z + 1) * row + x + 1);
             tops256_[at] = top.y256;
             if (x < 0 || z < 0) {
                 continue;
             }
             const Shade shade = shades_[top.palette_id].shade;
             out.positions256.emplace_back(x * kColumn256, top.y256, z * kColumn256);
-            out.normals.push_back(normal_of(top.y256, tops256_[at - 1],
-                                            tops256_[at - static_cast<std::size_t>(row)]));
+            out.normals.push_back(normal_of(top.y256, tops256_[at - 1], tops256_[at - row]));
             out.colors.emplace_back(shade.r, shade.g, shade.b);
             out.material_ids.push_back(shade.material);
         }
@@ -150,7 +149,8 @@ void HeightFieldMesher::mesh(Mesh& out, const Stack& stack, bool with_skirts) {
         }
     }
     if (with_skirts) {
-        const std::int64_t depth256 = std::int64_t{kSkirtCells * kColumn256} << stack.position.lod;
+        const std::int64_t depth256 = (std::int64_t{kSkirtCells} * kColumn256)
+                                      << stack.position.lod;
         const std::uint32_t last = stride * stride - 1;
         const std::array<Side, 4> sides = {{
             {.first = side, .stride = -1, .outward = {0, 0, -1}},       // z = 0

@@ -81,13 +81,12 @@ struct CellQueue {
 
 struct SurfaceNetsMesher::Buffers {
     Buffers(const WorldDefinition& definition, const MeshKernels& mesh_kernels)
-        : kernels(mesh_kernels), has_parts(definition.has_landscape()), water(definition) {}
+        : kernels(mesh_kernels), water(definition), has_parts(definition.has_landscape()) {}
 
+    CellResults results{};  // first, being aligned the widest
     const MeshKernels& kernels;
     CellQueue simple_cells;
     CellQueue other_cells;
-    CellResults results{};
-    bool has_parts;
     WaterSurface water;
     std::vector<std::int32_t> covered256;
     std::vector<LinearColor> material_colors;
@@ -97,6 +96,7 @@ struct SurfaceNetsMesher::Buffers {
     EdgeMasks edges;
     Cells cells;
     std::vector<PackedPosition> packed;
+    bool has_parts;
 };
 
 namespace {
@@ -186,10 +186,9 @@ class VertexMaker {
         const std::int32_t* from = is_simple ? columns_.top256.data() : columns_.plane256(0);
         for (std::int32_t plane = queue.planes(); plane > 0; --plane) {
             const Lanes ends = lanes_of(from, index) - floor256;
-            for (int lane = 0; lane < 4; ++lane) {
-                to[lane * kCellBatch] = ends[lane];
+            for (int lane = 0; lane < 4; ++lane, to += kCellBatch) {
+                *to = ends[lane];
             }
-            to += std::ptrdiff_t{4} * kCellBatch;
             from += columns_.column_count();
         }
         if (++queue.count == kCellBatch) {

@@ -157,7 +157,9 @@ std::uint32_t WaterSurface::add_vertex(Mesh& out, glm::i32vec3 position, glm::ve
 /// The vertex at a corner of the lattice; one for each height that is asked for there.
 std::uint32_t WaterSurface::corner(Mesh& out, std::int32_t x, std::int32_t z, std::int32_t y256,
                                    std::int32_t side) {
-    std::uint32_t& first = first_corner_[static_cast<std::size_t>(z * (side + 1) + x)];
+    const std::size_t row = static_cast<std::size_t>(side) + 1;
+    std::uint32_t& first =
+        first_corner_[static_cast<std::size_t>(z) * row + static_cast<std::size_t>(x)];
     for (std::uint32_t i = first; i != kNone; i = corners_[i].next) {
         if (corners_[i].y256 == y256) {
             return corners_[i].vertex;
@@ -215,8 +217,8 @@ void WaterSurface::add_strips(Mesh& out, const Stack& stack, std::int32_t x, std
 }
 
 void WaterSurface::forget_corners(std::int32_t side) {
-    first_corner_.assign(static_cast<std::size_t>(side + 1) * static_cast<std::size_t>(side + 1),
-                         kNone);
+    const std::size_t row = static_cast<std::size_t>(side) + 1;
+    first_corner_.assign(row * row, kNone);
     corners_.clear();
 }
 

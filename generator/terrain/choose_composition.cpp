@@ -220,7 +220,7 @@ bool is_alone(const WorldDefinition& definition, const Composition& composition)
 }
 
 std::int32_t blend256(double blend) {
-    return static_cast<std::int32_t>(static_cast<float>(blend) * 256.0F + 0.5F);
+    return static_cast<std::int32_t>(std::floor(static_cast<float>(blend) * 256.0F + 0.5F));
 }
 
 }  // namespace terrane

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -162,7 +163,7 @@ class ColumnWalk {
             const float thickness = thickness_at(region.elements[e - 1]);
             const float top = height + thickness;
             if (thickness > 0 && top > current) {
-                const auto top256 = static_cast<std::int32_t>(top * 256.0F + 0.5F);
+                const auto top256 = static_cast<std::int32_t>(std::floor(top * 256.0F + 0.5F));
                 if (top256 > state.bottom) {
                     state = with_element(state, e - 1, k, top256, first_owner);
                 }
@@ -268,7 +269,7 @@ class RowWriter {
   private:
     ColumnSource source_at(std::int32_t x, bool has_flow) const {
         static constexpr std::int32_t kNoFlow = 0;
-        const auto at = static_cast<std::size_t>((z_ + 1) * region_.shape.stride() + x + 1);
+        const std::size_t at = region_.shape.index(x + 1, z_ + 1);
         return {.region = region_,
                 .y256 = region_.y256.data() + at,
                 .middle = region_.middle.data() + at,

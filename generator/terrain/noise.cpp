@@ -110,11 +110,16 @@ Axis axis_of(std::span<const std::int64_t> listed) {
             .listed = listed.data()};
 }
 
+/// Values that a row's buffer has room for: kernels read and write beyond its end.
+std::size_t room_of_row(std::int32_t width) {
+    return static_cast<std::size_t>(padded_width(width)) + 2 * kVectorPad;
+}
+
 /// Hands out pieces of the buffers; they are sized before any piece is taken.
 class Pieces {
   public:
     Pieces(NoiseBuffers& buffers, std::int32_t width, std::int32_t rows, std::int32_t octaves) {
-        const auto row = static_cast<std::size_t>(padded_width(width) + 2 * kVectorPad);
+        const std::size_t row = room_of_row(width);
         const auto length = static_cast<std::size_t>(rows);
         const auto lattice = lattice_row(width) * 2 * length;
         const auto count = static_cast<std::size_t>(octaves);
@@ -206,7 +211,7 @@ class LatticeLines {
 
 /// Fills the columns' part of `rows` and the hashes of the lattice columns.
 void prepare_columns(NoiseRows& rows, Pieces& pieces, const NoiseOctave& octave, const Axis& axis) {
-    const auto row = static_cast<std::size_t>(padded_width(axis.count) + 2 * kVectorPad);
+    const std::size_t row = room_of_row(axis.count);
     float* const fraction_x = pieces.floats(row);
     float* const fade_x = pieces.floats(row);
     std::int32_t* const column_cell = pieces.integers(row);

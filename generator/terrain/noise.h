@@ -11,6 +11,7 @@
 #include "generator/terrain/kernels/row_kernels.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -50,6 +51,12 @@ struct RectangleShape {
     std::int64_t step = 1;    ///< voxels from column to column: 2^lod
 
     std::int32_t stride() const { return padded_width(width); }
+
+    /// Where the value of a column lies, both counted from the first.
+    std::size_t index(std::int32_t column, std::int32_t row) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(stride()) +
+               static_cast<std::size_t>(column);
+    }
 
     std::size_t padded_size() const {
         return static_cast<std::size_t>(stride()) * static_cast<std::size_t>(length) + kVectorPad;

@@ -12,7 +12,7 @@ namespace terrane {
 
 /// What a hash is for. Two things never share a stream, so adding a draw to one never moves
 /// another.
-enum class Tag : std::uint64_t { layer = 1, origin, plot, element, shape, noise, flow };
+enum class Tag : std::uint8_t { layer = 1, origin, plot, element, shape, noise, flow };
 
 constexpr std::uint64_t mix(std::uint64_t z) {
     z ^= z >> 30U;

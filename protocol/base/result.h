@@ -14,7 +14,7 @@
 
 namespace terrane {
 
-enum class ErrorCode : std::uint16_t {
+enum class ErrorCode : std::uint8_t {
     malformed = 1,          ///< bytes that do not follow the format
     too_large = 2,          ///< a length or count above its named limit
     unsupported = 3,        ///< a version, format or level of detail this build does not speak

@@ -187,5 +187,15 @@ TEST(DracoCodec, RefusesAPromiseOfMoreTrianglesThanItsBytesCanHold) {
         << decoded.error().message;
 }
 
+TEST(DracoCodec, RefusesACountOfVerticesBeyond64Bits) {
+    Bytes sample = small_sample();
+    // The vertices' own byte becomes their tenth; the triangles behind it are there as before.
+    sample.insert(sample.begin() + 12, 9, std::byte{0xFF});
+    const auto decoded = decode_draco(sample);
+    ASSERT_FALSE(decoded);
+    EXPECT_EQ(decoded.error().code, ErrorCode::malformed);
+    EXPECT_NE(decoded.error().message.find("header"), std::string::npos) << decoded.error().message;
+}
+
 }  // namespace
 }  // namespace terrane
