@@ -11,15 +11,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 namespace terrane {
 namespace {
-
-constexpr std::size_t kNameLengthBytes = 2;
-constexpr std::size_t kMetadataHeadBytes = 4 + 16 + 16 + 4 + kNameLengthBytes;
 
 /// Most significant byte first, so that bytes sort as numbers do.
 void append_big_endian(std::string& out, std::uint64_t value, std::size_t size_bytes) {
@@ -49,6 +47,12 @@ void append_interleaved(std::string& out, std::initializer_list<std::int32_t> va
             }
         }
     }
+}
+
+std::optional<Hash128> read_hash(ByteReader& in) {
+    const auto high = in.fixed<std::uint64_t>();
+    const auto low = in.fixed<std::uint64_t>();
+    return high && low ? std::optional(Hash128{.high = *high, .low = *low}) : std::nullopt;
 }
 
 struct XxhState {
@@ -109,14 +113,13 @@ Result<std::span<const std::byte>> unframe_value(std::string_view key,
                                                  std::span<const std::byte> framed) {
     ByteReader reader(framed);
     const auto version = reader.fixed<std::uint8_t>();
-    const auto high = reader.fixed<std::uint64_t>();
-    const auto low = reader.fixed<std::uint64_t>();
-    if (!version || !high || !low) {
+    const auto checksum = read_hash(reader);
+    if (!version || !checksum) {
         return fail(ErrorCode::corrupt,
                     "record: cut short at " + std::to_string(framed.size()) + " bytes");
     }
     const auto value = framed.subspan(kRecordHeadBytes);
-    if (record_checksum(*version, key, value) != Hash128{.high = *high, .low = *low}) {
+    if (record_checksum(*version, key, value) != *checksum) {
         return fail(ErrorCode::corrupt, "record: the checksum does not fit");
     }
     if (*version != kRecordVersion) {
@@ -155,21 +158,23 @@ Result<StoreMetadata> decode_metadata(std::span<const std::byte> framed) {
                                                      ", this build reads up to " +
                                                      std::to_string(kStoreFormat));
     }
-    if (!format || *format == 0 || value->size() < kMetadataHeadBytes) {
+    const auto fingerprint = read_hash(reader);
+    const auto content_id = read_hash(reader);
+    const auto generator_version = reader.fixed<std::uint32_t>();
+    const auto name_bytes = reader.fixed<std::uint16_t>();
+    if (!format || *format == 0 || !fingerprint || !content_id || !generator_version ||
+        !name_bytes) {
         return fail(ErrorCode::corrupt, "store metadata: cut short");
     }
-    StoreMetadata metadata{.format = *format, .identity = {}};
-    metadata.identity.fingerprint.high = *reader.fixed<std::uint64_t>();
-    metadata.identity.fingerprint.low = *reader.fixed<std::uint64_t>();
-    metadata.identity.content_id.high = *reader.fixed<std::uint64_t>();
-    metadata.identity.content_id.low = *reader.fixed<std::uint64_t>();
-    metadata.identity.generator_version = *reader.fixed<std::uint32_t>();
-    const std::size_t name_bytes = *reader.fixed<std::uint16_t>();
-    if (name_bytes != reader.remaining() || name_bytes > kStoredNameBytesMax) {
+    const auto name = reader.take(*name_bytes);
+    if (!name || reader.remaining() != 0 || *name_bytes > kStoredNameBytesMax) {
         return fail(ErrorCode::corrupt, "store metadata: the name has another length than it says");
     }
-    metadata.identity.world_name = std::string(text_of(*reader.take(name_bytes)));
-    return metadata;
+    return StoreMetadata{.format = *format,
+                         .identity = {.fingerprint = *fingerprint,
+                                      .content_id = *content_id,
+                                      .generator_version = *generator_version,
+                                      .world_name = std::string(text_of(*name))}};
 }
 
 Result<void> check_identity(const StoreIdentity& stored, const StoreIdentity& wanted,

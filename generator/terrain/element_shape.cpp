@@ -178,7 +178,7 @@ void raster_element(float* out, std::int32_t stride, const Element& element,
         std::fill_n(out + row * static_cast<std::size_t>(stride), width, 0.0F);
     }
     const float inverse_half_side = 2.0F / element.side;
-    std::array<float, kTileSide * kTileSide> values{};
+    std::array<float, std::size_t{kTileSide} * kTileSide> values{};
     for (Tile tile; tile.row < rectangle.length; tile.row += kTileSide) {
         tile.rows = std::min(kTileSide, rectangle.length - tile.row);
         for (tile.column = 0; tile.column < rectangle.width; tile.column += kTileSide) {
@@ -191,13 +191,15 @@ void raster_element(float* out, std::int32_t stride, const Element& element,
                                  static_cast<float>(rectangle.z0 + tile.row * rectangle.step),
                                  static_cast<float>(rectangle.step), shape.segments,
                                  inverse_half_side, element.thickness);
-            for (std::int32_t z = 0; z < tile.rows; ++z) {
+            const float* from = values.data();
+            for (std::int32_t z = tile.row; z < tile.row + tile.rows; ++z, from += kTileSide) {
+                const auto row = static_cast<std::size_t>(z);
+                const auto column = static_cast<std::size_t>(tile.column);
+                const std::uint8_t* const inside = buffers.inside.data() + row * width + column;
+                float* const to = out + row * static_cast<std::size_t>(stride) + column;
                 for (std::int32_t x = 0; x < tile.columns; ++x) {
-                    const std::int32_t column = tile.column + x;
-                    const std::int32_t row = tile.row + z;
-                    if (buffers.inside[static_cast<std::size_t>(row * rectangle.width + column)]) {
-                        out[row * stride + column] =
-                            values[static_cast<std::size_t>(z * kTileSide + x)];
+                    if (inside[x] != 0) {
+                        to[x] = from[x];
                     }
                 }
             }

@@ -75,23 +75,24 @@ StackGenerator::StackGenerator(StackGenerator&&) noexcept = default;
 StackGenerator& StackGenerator::operator=(StackGenerator&&) noexcept = default;
 
 Result<void> StackGenerator::build(const ColumnRectangle& rectangle) {
-    if (buffers_->landscape) {
-        begin_region(buffers_->region, *world_, rectangle, Landscape::kApron, buffers_->plots,
+    Buffers& buffers = *buffers_;
+    if (buffers.landscape) {
+        begin_region(buffers.region, *world_, rectangle, Landscape::kApron, buffers.plots,
                      *kernels_);
-        buffers_->landscape->build(buffers_->region, buffers_->constants, buffers_->plots,
-                                   *kernels_);
+        buffers.landscape->build(buffers.region, buffers.constants, buffers.plots, *kernels_);
     } else {
-        build_region(buffers_->region, *world_, buffers_->constants, rectangle, buffers_->plots,
+        build_region(buffers.region, *world_, buffers.constants, rectangle, buffers.plots,
                      *kernels_);
     }
-    return check_elements(buffers_->region, *world_);
+    return check_elements(buffers.region, *world_);
 }
 
 void StackGenerator::write(const ColumnWriterOutput& out, std::int32_t apron) {
-    if (buffers_->landscape) {
-        buffers_->landscape->write(out, buffers_->region, buffers_->constants, apron);
+    Buffers& buffers = *buffers_;
+    if (buffers.landscape) {
+        buffers.landscape->write(out, buffers.region, buffers.constants, apron);
     } else {
-        write_columns(out, buffers_->region, *world_, buffers_->constants, apron, *kernels_);
+        write_columns(out, buffers.region, *world_, buffers.constants, apron, *kernels_);
     }
 }
 

@@ -112,7 +112,7 @@ Axis axis_of(std::span<const std::int64_t> listed) {
 
 /// Values that a row's buffer has room for: kernels read and write beyond its end.
 std::size_t room_of_row(std::int32_t width) {
-    return static_cast<std::size_t>(padded_width(width)) + 2 * kVectorPad;
+    return static_cast<std::size_t>(padded_width(width)) + 2 * std::size_t{kVectorPad};
 }
 
 /// Hands out pieces of the buffers; they are sized before any piece is taken.

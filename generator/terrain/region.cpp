@@ -32,7 +32,7 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 }
 
 /// Where an element's square meets the region, in the region's rasters; nothing if nowhere.
-std::optional<PlacedElement> place(const PlottedElement& plotted, const RectangleShape& shape,
+std::optional<PlacedElement> place(PlottedElement& plotted, const RectangleShape& shape,
                                    std::int32_t plot_side) {
     const Element& element = plotted.element;
     const std::int64_t x = element.plot.x * plot_side - shape.x0;
@@ -56,6 +56,14 @@ std::optional<PlacedElement> place(const PlottedElement& plotted, const Rectangl
     }
     placed.stride = placed.columns;
     return placed;
+}
+
+/// Made when it is first asked for.
+const ElementShape& shape_of(PlottedElement& plotted) {
+    if (!plotted.shape) {
+        plotted.shape = make_shape(plotted.element);
+    }
+    return *plotted.shape;
 }
 
 /// Every element of every plot near enough that `is_wanted`, rastered; in laying order.
@@ -86,9 +94,6 @@ void find_elements(Region& region, const World& world, PlotCache& plots, const R
                 if (!placed || plotted.element.side <= 0 || !is_wanted(*placed)) {
                     continue;
                 }
-                if (!plotted.shape) {
-                    plotted.shape = make_shape(plotted.element);
-                }
                 region.elements.push_back(*placed);
             }
         }
@@ -106,7 +111,7 @@ void find_elements(Region& region, const World& world, PlotCache& plots, const R
     for (const PlacedElement& placed : region.elements) {
         const Element& element = placed.element();
         raster_element(region.thickness.data() + placed.raster, placed.stride, element,
-                       *placed.plotted->shape,
+                       shape_of(*placed.plotted),
                        {.x0 = shape.x0 + placed.column_first * shape.step - element.plot.x * side,
                         .z0 = shape.z0 + placed.row_first * shape.step - element.plot.z * side,
                         .width = placed.columns,
@@ -130,8 +135,7 @@ void lay_element(Region& region, const PlacedElement& placed, const float* heigh
     const std::uint64_t gap_bit = std::uint64_t{1} << static_cast<unsigned>(placed.element().gap);
     const std::uint8_t mark = replaces ? 0 : kElementStands;
     for (std::int32_t row = 0; row < placed.rows; ++row) {
-        const auto first = static_cast<std::size_t>(
-            (placed.row_first + row) * region.shape.stride() + placed.column_first);
+        const std::size_t first = region.shape.index(placed.column_first, placed.row_first + row);
         const float* const thickness =
             region.thickness.data() + placed.raster +
             static_cast<std::size_t>(row) * static_cast<std::size_t>(placed.stride);
@@ -153,7 +157,7 @@ void allocate(Region& region, std::size_t layers) {
     grow(region.stacked, plane);
     // Flow of the last columns reads a little past the last plane's end.
     grow(region.noise, plane);
-    grow(region.heights, plane * layers + 2 * kVectorPad);
+    grow(region.heights, plane * layers + 2 * std::size_t{kVectorPad});
     grow(region.y256, plane * layers);
     grow(region.flow, region.flow_plane_size() * layers);
     grow(region.middle, plane * layers);

@@ -30,8 +30,8 @@ struct ColumnRectangle {
 
 /// An element that stands in the region, with its raster over the columns it may cover.
 struct PlacedElement {
-    const PlottedElement* plotted = nullptr;  ///< owned by the plot cache
-    std::int32_t column_first = 0;            ///< raster's place in the region's rasters
+    PlottedElement* plotted = nullptr;  ///< owned by the plot cache
+    std::int32_t column_first = 0;      ///< raster's place in the region's rasters
     std::int32_t row_first = 0;
     std::int32_t columns = 0;
     std::int32_t rows = 0;
