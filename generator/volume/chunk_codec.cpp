@@ -16,7 +16,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -82,13 +81,13 @@ class RecordReader {
         TERRANE_ASSERT(materials_max >= 1 && materials_max <= kMaterialsMax);
     }
 
-    bool ok() const { return !error_; }
+    bool ok() const { return state_.has_value(); }
 
-    tl::unexpected<Error> failure() const { return tl::unexpected<Error>(*error_); }
+    tl::unexpected<Error> failure() const { return tl::unexpected<Error>(state_.error()); }
 
     void refuse(ErrorCode code, const char* message) {
-        if (!error_) {
-            error_ = Error{.code = code, .message = message};
+        if (ok()) {
+            state_ = fail(code, message);
         }
     }
 
@@ -105,7 +104,9 @@ class RecordReader {
         const auto value = reader_.varint();
         if (!value) {
             refuse(ErrorCode::malformed, "record: cut short");
-        } else if (*value > most) {
+            return 0;
+        }
+        if (*value > most) {
             refuse(ErrorCode::too_large, too_large);
         }
         return ok() ? *value : 0;
@@ -115,6 +116,7 @@ class RecordReader {
         const auto value = reader_.varint();
         if (!value || *value > std::numeric_limits<std::uint32_t>::max()) {
             refuse(ErrorCode::malformed, "record: a number is cut short or beyond 32 bits");
+            return 0;
         }
         return ok() ? static_cast<std::int32_t>(unzigzag(*value)) : 0;
     }
@@ -182,7 +184,7 @@ class RecordReader {
         const std::size_t limits_max = std::min(kLimitsMax, bytes_.size() * kLimitsPerByteMax);
         const auto decoded = decode_columns(out, reader_, palette, layout, limits_max);
         if (!decoded) {
-            error_ = decoded.error();
+            state_ = tl::unexpected<Error>(decoded.error());
             return;
         }
         out.width = layout.width;
@@ -192,7 +194,7 @@ class RecordReader {
         const std::size_t written = bytes_.size() - reader_.remaining();
         const std::size_t least = std::max(written, least_bytes(out.limits.size()));
         const auto padding = reader_.take(reader_.remaining());
-        if (bytes_.size() != least ||
+        if (!padding || bytes_.size() != least ||
             std::ranges::any_of(*padding, [](std::byte byte) { return byte != std::byte{0}; })) {
             refuse(ErrorCode::malformed, "record: bytes left over");
         }
@@ -222,7 +224,7 @@ class RecordReader {
     std::span<const std::byte> bytes_;
     ByteReader reader_;
     std::size_t materials_max_;
-    std::optional<Error> error_;
+    Result<void> state_;
 };
 
 struct Head {

@@ -37,8 +37,8 @@ std::size_t trailing_zeros(RowMask mask) {
 }
 
 std::size_t cells_of(RowMask mask) {
-    return static_cast<std::size_t>(std::popcount(static_cast<std::uint64_t>(mask)) +
-                                    std::popcount(static_cast<std::uint64_t>(mask >> 64U)));
+    return static_cast<std::size_t>(std::popcount(static_cast<std::uint64_t>(mask))) +
+           static_cast<std::size_t>(std::popcount(static_cast<std::uint64_t>(mask >> 64U)));
 }
 
 /// A row's cells by what they have around them.

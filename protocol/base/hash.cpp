@@ -11,6 +11,16 @@
 #include <string_view>
 
 namespace terrane {
+namespace {
+
+/// Of 16 hexadecimal digits.
+std::uint64_t number_of(std::string_view digits) {
+    std::uint64_t number = 0;
+    std::from_chars(digits.data(), digits.data() + digits.size(), number, 16);
+    return number;
+}
+
+}  // namespace
 
 Hash128 hash128(std::span<const std::byte> bytes) {
     const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
@@ -36,10 +46,7 @@ std::optional<Hash128> hash_from_hex(std::string_view text) {
     if (text.size() != 32 || text.find_first_not_of("0123456789abcdefABCDEF") != text.npos) {
         return std::nullopt;
     }
-    Hash128 hash;
-    std::from_chars(text.data(), text.data() + 16, hash.high, 16);
-    std::from_chars(text.data() + 16, text.data() + 32, hash.low, 16);
-    return hash;
+    return Hash128{.high = number_of(text.substr(0, 16)), .low = number_of(text.substr(16))};
 }
 
 }  // namespace terrane
