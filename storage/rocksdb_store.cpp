@@ -43,7 +43,7 @@ constexpr std::size_t kBlockBytes = std::size_t{16} << 10U;
 constexpr double kBloomBitsPerKey = 10;
 
 // Order of the column families everywhere below; RocksDB insists on `default`, which stays empty.
-enum FamilyIndex : std::size_t { family_default, family_stacks, family_meshes, family_metadata };
+enum FamilyIndex : std::uint8_t { family_default, family_stacks, family_meshes, family_metadata };
 
 constexpr std::array<const char*, 4> kFamilyNames = {"default", "stacks", "meshes", "metadata"};
 
@@ -214,6 +214,7 @@ rocksdb::Status open_database(Database& out, const StoreDirectory& directory, bo
     settings.listeners.push_back(out.errors);
     const auto cache = rocksdb::NewLRUCache(options.block_cache_bytes);
     std::vector<rocksdb::ColumnFamilyDescriptor> families;
+    families.reserve(kFamilyNames.size());
     for (const char* name : kFamilyNames) {
         families.emplace_back(name, family_options(options, cache));
     }
