@@ -1,8 +1,7 @@
-// How keys travel: `waiting_` (asked for, not sent) -> `in_flight_` (sent) -> an event. A busy one
-// goes to `paused_` and from there to `waiting_` again when its time has come.
 #include "client-sample/cpp/client.h"
 
 #include "client-sample/cpp/connection.h"
+#include "client-sample/cpp/wanted_chunks.h"
 #include "protocol/base/bytes.h"
 #include "protocol/base/coords.h"
 #include "protocol/base/result.h"
@@ -15,7 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <map>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
@@ -30,23 +29,6 @@ namespace terrane {
 namespace {
 
 using std::chrono::steady_clock;
-
-/// A key that has no answer yet.
-struct Wanted {
-    ChunkPos key;
-    ChunkFormat format = ChunkFormat::draco;
-    std::int32_t priority = 0;
-    std::uint32_t request_id =
-        0;  ///< as the caller knows it; on the wire every sending has one of its own
-    int tries = 0;
-    bool is_cancelled = false;
-    Deadline first_sent;
-};
-
-std::string to_text(ChunkPos key) {
-    return "chunk " + std::to_string(key.lod) + "/" + std::to_string(key.x) + "/" +
-           std::to_string(key.y) + "/" + std::to_string(key.z);
-}
 
 /// What a Failure without id or key may say of one message, after which the session goes on.
 bool is_about_one_message(ErrorCode code) {
@@ -80,7 +62,7 @@ class Client::Session {
 
     const ServerHello& hello() const { return hello_; }
 
-    std::size_t unanswered() const { return unanswered_ + queries_.size(); }
+    std::size_t unanswered() const { return wanted_.unanswered() + queries_.size(); }
 
   private:
     template <typename T>
@@ -91,13 +73,11 @@ class Client::Session {
 
     Result<void> send_what_is_due();
     Result<void> give_credit(std::size_t above_bytes);
-    Result<void> send_batch();
     Result<std::optional<AnyMessage>> read_message(Bytes& payload);
     Result<void> receive(Deadline deadline);
     Result<void> take(AnyMessage message, Bytes payload);
     Result<void> take_chunk(const ChunkAnswer& answer, Bytes payload);
     Result<void> take_failure(const Failure& failure);
-    void settle_failure(const Wanted& wanted, const Failure& failure);
 
     Connection connection_;
     std::chrono::milliseconds send_timeout_;
@@ -105,11 +85,7 @@ class Client::Session {
     ServerHello hello_;
     std::optional<Error> error_;
     std::uint32_t last_id_ = 0;
-    std::size_t unanswered_ = 0;  ///< keys that are waiting, paused or in flight, and not cancelled
-    std::size_t keys_in_flight_ = 0;
-    std::deque<Wanted> waiting_;
-    std::multimap<Deadline, Wanted> paused_;
-    std::map<std::uint32_t, std::vector<Wanted>> in_flight_;  ///< by the id on the wire
+    WantedChunks wanted_;
     std::set<std::uint32_t> queries_;
     std::deque<ClientEvent> events_;
     bool has_view_ = false;           ///< one has been asked for
@@ -130,14 +106,14 @@ Result<void> Client::Session::greet(const ClientOptions& options, Deadline deadl
         if (!message) {
             return tl::unexpected(message.error());
         }
-        if (*message) {
-            if (const auto* failure = std::get_if<Failure>(&**message)) {
+        if (std::optional<AnyMessage>& read = *message) {
+            if (const auto* failure = std::get_if<Failure>(&*read)) {
                 return tl::unexpected(failure->error);
             }
-            auto* hello = std::get_if<ServerHello>(&**message);
+            auto* hello = std::get_if<ServerHello>(&*read);
             if (hello == nullptr) {
                 return fail(ErrorCode::malformed,
-                            "the server greets with " + std::string(name_of(**message)));
+                            "the server greets with " + std::string(name_of(*read)));
             }
             if (hello->protocol_version != kProtocolVersion) {
                 return fail(ErrorCode::version_mismatch,
@@ -159,25 +135,14 @@ Result<void> Client::Session::greet(const ClientOptions& options, Deadline deadl
 
 Result<std::uint32_t> Client::Session::request(std::span<const ChunkPos> keys, ChunkFormat format,
                                                std::int32_t priority) {
-    if (keys.size() > kUnansweredMax - unanswered_) {
-        return fail(ErrorCode::busy, std::to_string(unanswered_) +
-                                         " chunks have no answer yet, at most " +
-                                         std::to_string(kUnansweredMax) + " may");
+    if (const auto room = wanted_.make_room_for(keys.size()); !room) {
+        return tl::unexpected(room.error());
     }
     if (error_) {
         return tl::unexpected(*error_);
     }
     const std::uint32_t id = next_id();
-    for (const ChunkPos key : keys) {
-        waiting_.push_back({.key = key,
-                            .format = format,
-                            .priority = priority,
-                            .request_id = id,
-                            .tries = 0,
-                            .is_cancelled = false,
-                            .first_sent = {}});
-    }
-    unanswered_ += keys.size();
+    wanted_.add(keys, format, priority, id);
     if (const auto sent = send_what_is_due(); !sent) {
         return broken(sent);
     }
@@ -188,36 +153,20 @@ Result<void> Client::Session::cancel(std::uint32_t request_id) {
     if (request_id == 0) {  // the view's
         return {};
     }
-    unanswered_ -=
-        std::erase_if(waiting_, [&](const Wanted& w) { return w.request_id == request_id; });
-    unanswered_ -=
-        std::erase_if(paused_, [&](const auto& w) { return w.second.request_id == request_id; });
     std::erase_if(events_, [&](const ClientEvent& event) {
         const auto* chunk = std::get_if<ReceivedChunk>(&event);
         const auto* failure = std::get_if<Failure>(&event);
         return (chunk != nullptr && chunk->answer.request_id == request_id) ||
                (failure != nullptr && failure->request_id == request_id);
     });
-    ChunkCancel cancel;
-    for (auto& [wire_id, sent] : in_flight_) {
-        if (sent.front().request_id != request_id || sent.front().is_cancelled) {
-            continue;
-        }
-        // They stay in flight: the server still answers each, and counts it until then.
-        for (Wanted& wanted : sent) {
-            wanted.is_cancelled = true;
-        }
-        unanswered_ -= sent.size();
-        cancel.request_ids.push_back(wire_id);
-    }
-    while (!cancel.request_ids.empty()) {
-        const std::size_t count = std::min(cancel.request_ids.size(), kRequestsPerCancelMax);
-        const auto first = cancel.request_ids.end() - static_cast<std::ptrdiff_t>(count);
-        if (const auto sent = send(ChunkCancel{.request_ids = {first, cancel.request_ids.end()}});
-            !sent) {
+    std::vector<std::uint32_t> wire_ids = wanted_.cancel(request_id);
+    while (!wire_ids.empty()) {
+        const std::size_t count = std::min(wire_ids.size(), kRequestsPerCancelMax);
+        const auto first = wire_ids.end() - static_cast<std::ptrdiff_t>(count);
+        if (const auto sent = send(ChunkCancel{.request_ids = {first, wire_ids.end()}}); !sent) {
             return sent;
         }
-        cancel.request_ids.erase(first, cancel.request_ids.end());
+        wire_ids.erase(first, wire_ids.end());
     }
     return {};
 }
@@ -229,11 +178,11 @@ Result<void> Client::Session::view(const ViewUpdate& update) {
     // What the server would refuse is told here, where it can be put right.
     FrameReader reader(kInboundFrameLimits);
     reader.feed(encode_message(update));
-    const auto frame = reader.next();
-    if (!frame || !*frame) {
+    const auto frame = reader.next().value_or(std::nullopt);
+    if (!frame) {
         return fail(ErrorCode::invalid_argument, "ViewUpdate: too large for a frame");
     }
-    if (const auto checked = decode_message(**frame); !checked) {
+    if (const auto checked = decode_message(*frame); !checked) {
         return tl::unexpected(checked.error());
     }
     has_view_ = true;
@@ -261,66 +210,39 @@ Result<void> Client::Session::send(const AnyMessage& message) {
 }
 
 Result<void> Client::Session::send_what_is_due() {
-    const auto now = steady_clock::now();
-    while (!paused_.empty() && paused_.begin()->first <= now) {
-        waiting_.push_back(paused_.begin()->second);
-        paused_.erase(paused_.begin());
-    }
-    while (!waiting_.empty() && keys_in_flight_ < hello_.limits.keys_in_flight_max) {
-        if (const auto sent = send_batch(); !sent) {
+    wanted_.wake(steady_clock::now());
+    while (wanted_.may_send(hello_.limits)) {
+        const ChunkRequest request =
+            wanted_.next_request(hello_.limits, next_id(), steady_clock::now());
+        if (const auto sent = send(request); !sent) {
             return sent;
         }
     }
     return {};
 }
 
-/// One request of the first waiting keys that were asked for together.
-Result<void> Client::Session::send_batch() {
-    const std::size_t room =
-        std::min({std::size_t{hello_.limits.keys_per_request_max}, kKeysPerRequestMax,
-                  std::size_t{hello_.limits.keys_in_flight_max} - keys_in_flight_});
-    const Wanted first = waiting_.front();
-    const std::uint32_t wire_id = next_id();
-    ChunkRequest request{.request_id = wire_id,
-                         .format = first.format,
-                         .keys = {},
-                         .known_etags = {},
-                         .priority = first.priority,
-                         .without_flow = false};
-    std::vector<Wanted> batch;
-    const auto now = steady_clock::now();
-    while (!waiting_.empty() && batch.size() < room &&
-           waiting_.front().request_id == first.request_id) {
-        Wanted& wanted = batch.emplace_back(waiting_.front());
-        waiting_.pop_front();
-        wanted.first_sent = wanted.tries == 0 ? now : wanted.first_sent;
-        ++wanted.tries;
-        request.keys.push_back(wanted.key);
-    }
-    keys_in_flight_ += batch.size();
-    in_flight_.emplace(wire_id, std::move(batch));
-    return send(request);
-}
-
 /// The next message of what has been received, its payload copied out; nothing if it is not whole
 /// yet.
 Result<std::optional<AnyMessage>> Client::Session::read_message(Bytes& payload) {
-    auto frame = reader_.next();
-    while (frame && *frame && !is_known(**frame)) {  // a newer server's: passed over
-        frame = reader_.next();
+    for (;;) {
+        const auto next = reader_.next();
+        if (!next) {
+            return tl::unexpected(next.error());
+        }
+        const std::optional<Frame>& frame = *next;
+        if (!frame) {
+            return std::nullopt;
+        }
+        if (!is_known(*frame)) {  // a newer server's: passed over
+            continue;
+        }
+        auto message = decode_message(*frame);
+        if (!message) {
+            return tl::unexpected(message.error());
+        }
+        payload.assign(frame->payload.begin(), frame->payload.end());
+        return std::move(*message);
     }
-    if (!frame) {
-        return tl::unexpected(frame.error());
-    }
-    if (!*frame) {
-        return std::nullopt;
-    }
-    auto message = decode_message(**frame);
-    if (!message) {
-        return tl::unexpected(message.error());
-    }
-    payload.assign((*frame)->payload.begin(), (*frame)->payload.end());
-    return std::move(*message);
 }
 
 Result<void> Client::Session::receive(Deadline deadline) {
@@ -363,8 +285,8 @@ Result<std::optional<ClientEvent>> Client::Session::next(Deadline deadline) {
         if (!message) {
             return broken(message);
         }
-        if (*message) {
-            if (const auto taken = take(std::move(**message), std::move(payload)); !taken) {
+        if (std::optional<AnyMessage>& read = *message) {
+            if (const auto taken = take(*std::move(read), std::move(payload)); !taken) {
                 return broken(taken);
             }
             continue;
@@ -375,8 +297,7 @@ Result<std::optional<ClientEvent>> Client::Session::next(Deadline deadline) {
         if (const auto given = give_credit(0); !given) {  // nothing else is at hand
             return broken(given);
         }
-        const Deadline wake =
-            paused_.empty() ? deadline : std::min(deadline, paused_.begin()->first);
+        const Deadline wake = std::min(deadline, wanted_.wake_at().value_or(deadline));
         if (const auto received = receive(wake); !received) {
             return broken(received);
         }
@@ -426,31 +347,13 @@ Result<void> Client::Session::take_chunk(const ChunkAnswer& answer, Bytes payloa
             ReceivedChunk{.answer = answer, .payload = std::move(payload), .waited = {}});
         return {};
     }
-    const auto sent = in_flight_.find(answer.request_id);
-    const auto matches = [&](const Wanted& w) {
-        return w.key == answer.key && w.format == answer.format;
-    };
-    if (sent == in_flight_.end() || std::ranges::none_of(sent->second, matches)) {
-        return fail(ErrorCode::malformed,
-                    "the server sent " + to_text(answer.key) + " that nobody asked for");
+    auto taken = wanted_.take(answer, std::move(payload), steady_clock::now());
+    if (!taken) {
+        return tl::unexpected(taken.error());
     }
-    const auto found = std::ranges::find_if(sent->second, matches);
-    const Wanted wanted = *found;
-    sent->second.erase(found);
-    --keys_in_flight_;
-    if (sent->second.empty()) {
-        in_flight_.erase(sent);
+    if (std::optional<ReceivedChunk>& chunk = *taken) {
+        events_.emplace_back(*std::move(chunk));
     }
-    if (wanted.is_cancelled) {
-        return {};
-    }
-    --unanswered_;
-    ReceivedChunk chunk{.answer = answer,
-                        .payload = std::move(payload),
-                        .waited = std::chrono::duration_cast<std::chrono::microseconds>(
-                            steady_clock::now() - wanted.first_sent)};
-    chunk.answer.request_id = wanted.request_id;
-    events_.emplace_back(std::move(chunk));
     return {};
 }
 
@@ -466,51 +369,12 @@ Result<void> Client::Session::take_failure(const Failure& failure) {
         events_.emplace_back(failure);
         return {};
     }
-    const auto sent = in_flight_.find(failure.request_id);
-    if (sent == in_flight_.end()) {
-        return fail(ErrorCode::malformed,
-                    "the server refused a request that was never made: " + failure.error.message);
+    auto told = wanted_.take(failure, steady_clock::now());
+    if (!told) {
+        return tl::unexpected(told.error());
     }
-    std::vector<Wanted> refused;
-    if (failure.key) {
-        const auto found = std::ranges::find(sent->second, *failure.key, &Wanted::key);
-        if (found == sent->second.end()) {
-            return fail(ErrorCode::malformed,
-                        "the server refused " + to_text(*failure.key) + " that nobody asked for");
-        }
-        refused.push_back(*found);
-        sent->second.erase(found);
-    } else {
-        refused.swap(sent->second);
-    }
-    if (sent->second.empty()) {
-        in_flight_.erase(sent);
-    }
-    keys_in_flight_ -= refused.size();
-    for (const Wanted& wanted : refused) {
-        settle_failure(wanted, failure);
-    }
+    std::ranges::move(*told, std::back_inserter(events_));
     return {};
-}
-
-/// A busy key is tried again later, until it has been tried enough; everything else is told.
-void Client::Session::settle_failure(const Wanted& wanted, const Failure& failure) {
-    if (wanted.is_cancelled) {
-        return;
-    }
-    if (failure.error.code == ErrorCode::busy && wanted.tries < kBusyTriesMax) {
-        const std::uint64_t grown_ms = std::uint64_t{std::max(failure.retry_after_ms, 1U)}
-                                       << static_cast<unsigned>(wanted.tries - 1);
-        const auto pause_ms = std::max<std::uint64_t>(
-            failure.retry_after_ms, std::min<std::uint64_t>(grown_ms, kBusyPauseMaxMs));
-        paused_.emplace(steady_clock::now() + std::chrono::milliseconds(pause_ms), wanted);
-        return;
-    }
-    --unanswered_;
-    Failure told = failure;
-    told.request_id = wanted.request_id;
-    told.key = wanted.key;
-    events_.emplace_back(std::move(told));
 }
 
 Client::Client(std::unique_ptr<Session> session) : session_(std::move(session)) {}
