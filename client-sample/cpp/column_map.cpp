@@ -105,7 +105,8 @@ class ColumnMap::Gathering {
     const std::vector<Piece>* find(StackPos stack, Heights heights) {
         const auto known = pieces_.find(stack);
         if (known != pieces_.end()) {
-            return known->second ? &*known->second : nullptr;
+            const std::optional<std::vector<Piece>>& held = known->second;
+            return held ? &*held : nullptr;
         }
         std::optional<std::vector<Piece>>& pieces = pieces_[stack];
         const auto chunks = chunks_of(stack, heights);
@@ -213,8 +214,8 @@ Result<void> ColumnMap::put(const ChunkAnswer& answer, std::span<const std::byte
     if (!content) {
         return tl::unexpected(content.error());
     }
-    if (content->chunk) {
-        put(std::move(*content->chunk));
+    if (std::optional<Chunk>& chunk = content->chunk) {
+        put(*std::move(chunk));
     } else if (answer.status == ChunkStatus::uniform || answer.status == ChunkStatus::empty) {
         put(uniform_chunk(answer));
     }

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -107,14 +108,15 @@ Result<std::vector<TerrainChange>> Terrain::poll(Deadline deadline) {
             to_look_at_.pop_back();
             mesh_if_ready(key, changes);
         } else {
-            auto event = client_.next(changes.empty() ? deadline : steady_clock::now());
-            if (!event) {
-                return tl::unexpected(event.error());
+            auto next = client_.next(changes.empty() ? deadline : steady_clock::now());
+            if (!next) {
+                return tl::unexpected(next.error());
             }
-            if (!*event) {
+            std::optional<ClientEvent>& event = *next;
+            if (!event) {
                 break;
             }
-            if (const auto taken = take(std::move(**event), changes); !taken) {
+            if (const auto taken = take(*std::move(event), changes); !taken) {
                 return tl::unexpected(taken.error());
             }
         }
@@ -168,8 +170,7 @@ void Terrain::take_chunk(const ReceivedChunk& chunk, std::vector<TerrainChange>&
         unreadable(content.error());
         return;
     }
-    changes.emplace_back(
-        ChunkReady{.key = key, .mesh = content->mesh ? std::move(*content->mesh) : Mesh()});
+    changes.emplace_back(ChunkReady{.key = key, .mesh = std::move(content->mesh).value_or(Mesh())});
 }
 
 void Terrain::take_forget(const ChunkForget& forget, std::vector<TerrainChange>& changes) {

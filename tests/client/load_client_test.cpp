@@ -25,7 +25,7 @@ class LoadClientTest : public testing::Test {
   protected:
     void SetUp() override {
         handlers_.chunk = [this](const ChunkAnswer&, std::span<const std::byte>) { ++decoded_; };
-        handlers_.world = [this](const WorldAnswer&) { ++worlds_; };
+        handlers_.world = [this](const WorldAnswer&, const ServerHello&) { ++worlds_; };
     }
 
     LoadClient make(const LoadClientOptions& options) {

@@ -19,21 +19,24 @@ namespace terrane {
 namespace {
 
 Result<std::optional<CarriedMessage>> next_message(FrameReader& reader) {
-    auto frame = reader.next();
-    while (frame && *frame && !is_known(**frame)) {  // a newer server's: passed over
-        frame = reader.next();
+    for (;;) {
+        const auto next = reader.next();
+        if (!next) {
+            return tl::unexpected(next.error());
+        }
+        const std::optional<Frame>& frame = *next;
+        if (!frame) {
+            return std::nullopt;
+        }
+        if (!is_known(*frame)) {  // a newer server's: passed over
+            continue;
+        }
+        auto message = decode_message(*frame);
+        if (!message) {
+            return tl::unexpected(message.error());
+        }
+        return CarriedMessage{.message = std::move(*message), .payload = frame->payload};
     }
-    if (!frame) {
-        return tl::unexpected(frame.error());
-    }
-    if (!*frame) {
-        return std::nullopt;
-    }
-    auto message = decode_message(**frame);
-    if (!message) {
-        return tl::unexpected(message.error());
-    }
-    return CarriedMessage{.message = std::move(*message), .payload = (*frame)->payload};
 }
 
 class TcpCarrier final : public Carrier {

@@ -7,6 +7,7 @@
 #include "client-sample/cpp/program/get_report.h"
 #include "client-sample/cpp/program/obj.h"
 #include "client-sample/cpp/program/program.h"
+#include "generator/mesh/mesh.h"
 #include "protocol/base/bytes.h"
 #include "protocol/base/coords.h"
 #include "protocol/base/hash.h"
@@ -24,6 +25,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -105,8 +107,8 @@ void settle_chunk(GetRow& row, const ReceivedChunk& chunk, const Places& places,
             row.error = written.error();
         }
     }
-    if (options.obj && content->mesh) {
-        const std::string text = obj_of(*content->mesh, row.key, world);
+    if (const std::optional<Mesh>& mesh = content->mesh; options.obj && mesh) {
+        const std::string text = obj_of(*mesh, row.key, world);
         if (const auto written = write_file(places.obj_of(row.key), bytes_of(text)); !written) {
             row.error = written.error();
         }
@@ -124,19 +126,23 @@ Result<void> fetch(Client& client, std::vector<GetRow>& rows, const Places& plac
         return tl::unexpected(requested.error());
     }
     while (client.unanswered() > 0) {
-        const auto event = client.next(deadline);
-        if (!event) {
-            return tl::unexpected(event.error());
+        const auto next = client.next(deadline);
+        if (!next) {
+            return tl::unexpected(next.error());
         }
-        if (!*event) {
+        const std::optional<ClientEvent>& event = *next;
+        if (!event) {
             return fail(ErrorCode::io_error, std::to_string(client.unanswered()) + " of " +
                                                  std::to_string(rows.size()) +
                                                  " chunks did not come in time");
         }
-        if (const auto* chunk = std::get_if<ReceivedChunk>(&**event)) {
+        if (const auto* chunk = std::get_if<ReceivedChunk>(&*event)) {
             settle_chunk(*row_of.at(chunk->answer.key), *chunk, places, options, client.hello());
-        } else if (const auto* failure = std::get_if<Failure>(&**event)) {
-            row_of.at(failure->key.value())->error = failure->error;
+        } else if (const auto* failure = std::get_if<Failure>(&*event)) {
+            if (!failure->key) {
+                return tl::unexpected(failure->error);
+            }
+            row_of.at(*failure->key)->error = failure->error;
         }
     }
     return {};

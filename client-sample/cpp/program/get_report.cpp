@@ -51,8 +51,8 @@ Line line_of(const GetRow& row) {
             milliseconds(row.waited.count())};
 }
 
-nlohmann::ordered_json json_of(const GetRow& row, const ServerHello& world) {
-    const ChunkAnswer& answer = *row.answer;
+nlohmann::ordered_json json_of(const GetRow& row, const ChunkAnswer& answer,
+                               const ServerHello& world) {
     nlohmann::ordered_json json = {{"lod", row.key.lod},
                                    {"x", row.key.x},
                                    {"y", row.key.y},
@@ -109,7 +109,7 @@ std::string report_json(std::span<const GetRow> rows, const ServerHello& world) 
     nlohmann::ordered_json json = {{"chunks", nlohmann::ordered_json::array()}};
     for (const GetRow& row : rows) {
         if (row.answer && !row.error) {
-            json["chunks"].push_back(json_of(row, world));
+            json["chunks"].push_back(json_of(row, *row.answer, world));
         } else {
             const Error error =
                 row.error.value_or(Error{.code = ErrorCode::io_error, .message = "no answer"});

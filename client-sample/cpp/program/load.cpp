@@ -19,7 +19,6 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -59,7 +58,9 @@ class LoadRun {
         handlers_.chunk = [this](const ChunkAnswer& answer, std::span<const std::byte> payload) {
             sample(answer, payload);
         };
-        handlers_.world = [this](const WorldAnswer& answer) { take_world(answer); };
+        handlers_.world = [this](const WorldAnswer& answer, const ServerHello& hello) {
+            take_world(answer, hello);
+        };
     }
 
     Result<LoadResult> run();
@@ -77,7 +78,7 @@ class LoadRun {
     };
 
     void sample(const ChunkAnswer& answer, std::span<const std::byte> payload);
-    void take_world(const WorldAnswer& answer);
+    void take_world(const WorldAnswer& answer, const ServerHello& hello);
     void start_clients(Clock::time_point now);
     void tick_clients(Clock::time_point now);
     bool has_work() const;
@@ -91,7 +92,7 @@ class LoadRun {
     const std::function<void(const std::string&)>& progress_;
     const Clock::time_point begin_;
     LoadClient::Handlers handlers_;
-    std::optional<StreamLoop> loop_;
+    StreamLoop* loop_ = nullptr;  ///< of `run`, from which all else is called
     std::vector<Viewer> viewers_;
     std::unique_ptr<LocalCheck> check_;
     std::uint64_t seen_ = 0;  ///< chunks, of which every check_every-th is checked
@@ -114,8 +115,8 @@ void LoadRun::sample(const ChunkAnswer& answer, std::span<const std::byte> paylo
     }
 }
 
-void LoadRun::take_world(const WorldAnswer& answer) {
-    auto world = build_sent_world(answer, viewers_[0].client->hello()->fingerprint);
+void LoadRun::take_world(const WorldAnswer& answer, const ServerHello& hello) {
+    auto world = build_sent_world(answer, hello.fingerprint);
     if (world) {
         check_ = std::make_unique<LocalCheck>(
             std::move(*world), options_.carrier == CarrierKind::http ? kHttpShareTolerance : 0.0);
@@ -264,7 +265,7 @@ Result<LoadResult> LoadRun::run() {
     if (!loop) {
         return tl::unexpected(loop.error());
     }
-    loop_ = std::move(*loop);
+    loop_ = &*loop;
     viewers_.reserve(options_.clients);
     const auto duration = std::chrono::duration_cast<Clock::duration>(
         std::chrono::duration<double>(options_.seconds));

@@ -91,19 +91,20 @@ void LoadClient::tick(Clock::time_point now) {
     if (!hello_) {
         return;
     }
+    const ServerHello& world = *hello_;
     account_wanting(now);
     if (is_moving_) {
         place_ = movement_.at(std::chrono::duration<double>(now - begin_).count());
     }
-    look(now);
+    look(world, now);
     if (!options_.by_view) {
-        ask(now);
+        ask(world.limits, now);
     }
 }
 
 /// Tells the server where the viewer is if that has changed enough, and finds what is wanted now.
-void LoadClient::look(Clock::time_point now) {
-    const double side = hello_->chunk_side;
+void LoadClient::look(const ServerHello& world, Clock::time_point now) {
+    const double side = world.chunk_side;
     const bool is_again = view_due_ && *view_due_ <= now;
     if (told_place_ && !is_again &&
         std::max(std::abs(place_.x - told_place_->x), std::abs(place_.z - told_place_->z)) <
@@ -111,7 +112,7 @@ void LoadClient::look(Clock::time_point now) {
         return;
     }
     // Those who have no height of their own are at half the world's.
-    const double y = place_.y != 0 ? place_.y : hello_->height_bound_voxels / 2;
+    const double y = place_.y != 0 ? place_.y : world.height_bound_voxels / 2;
     ViewUpdate view{.x = place_.x,
                     .y = y,
                     .z = place_.z,
@@ -131,13 +132,14 @@ void LoadClient::look(Clock::time_point now) {
     if (options_.by_view) {
         send(view);
     }
-    const ViewSet next(view, *hello_);
+    const ViewSet next(view, world);
     if (!(next == view_)) {
-        change_wants(next, now);
+        change_wants(world, next, now);
     }
 }
 
-void LoadClient::change_wants(const ViewSet& next, Clock::time_point now) {
+void LoadClient::change_wants(const ServerHello& world, const ViewSet& next,
+                              Clock::time_point now) {
     std::erase_if(wants_, [&](const auto& entry) {
         if (next.contains(entry.first)) {
             return false;
@@ -153,7 +155,7 @@ void LoadClient::change_wants(const ViewSet& next, Clock::time_point now) {
     }
     view_ = next;
     for (const StackPos square : added) {
-        const auto heights = static_cast<std::size_t>(heights_of(square.lod, *hello_));
+        const auto heights = static_cast<std::size_t>(heights_of(square.lod, world));
         wants_.insert_or_assign(square,
                                 Want{.since = now, .has_come = std::vector<bool>(heights, false)});
         miss(heights, now);
@@ -162,21 +164,21 @@ void LoadClient::change_wants(const ViewSet& next, Clock::time_point now) {
         return;
     }
     std::ranges::sort(added, {}, [&](StackPos square) {
-        const double side = hello_->chunk_side * std::exp2(square.lod);
+        const double side = world.chunk_side * std::exp2(square.lod);
         return std::pair(std::max(std::abs((square.x + 0.5) * side - place_.x),
                                   std::abs((square.z + 0.5) * side - place_.z)),
                          square);
     });
     std::erase_if(to_ask_, [&](ChunkPos key) { return !view_.contains(stack_of(key)); });
     for (const StackPos square : added) {
-        for (std::int32_t y = 0; y < heights_of(square.lod, *hello_); ++y) {
+        for (std::int32_t y = 0; y < heights_of(square.lod, world); ++y) {
             to_ask_.push_back({.lod = square.lod, .x = square.x, .y = y, .z = square.z});
         }
     }
 }
 
 /// Without views: requests of as many keys as may be under way.
-void LoadClient::ask(Clock::time_point now) {
+void LoadClient::ask(const WireLimits& limits, Clock::time_point now) {
     while (!paused_.empty() && paused_.begin()->first <= now) {
         if (view_.contains(stack_of(paused_.begin()->second))) {
             to_ask_.push_back(paused_.begin()->second);
@@ -184,9 +186,9 @@ void LoadClient::ask(Clock::time_point now) {
         paused_.erase(paused_.begin());
     }
     const std::size_t in_flight_max =
-        std::min<std::size_t>(hello_->limits.keys_in_flight_max, kLoadKeysInFlightMax);
+        std::min<std::size_t>(limits.keys_in_flight_max, kLoadKeysInFlightMax);
     const std::size_t keys_max =
-        std::clamp<std::size_t>(hello_->limits.keys_per_request_max, 1, kKeysPerRequestMax);
+        std::clamp<std::size_t>(limits.keys_per_request_max, 1, kKeysPerRequestMax);
     while (!to_ask_.empty() && keys_in_flight_ < in_flight_max) {
         ChunkRequest request;
         last_id_ = last_id_ == std::numeric_limits<std::uint32_t>::max() ? 1 : last_id_ + 1;
@@ -209,14 +211,15 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
         return fed;
     }
     for (;;) {
-        auto carried = carrier_->next();
-        if (!carried) {
-            return tl::unexpected(carried.error());
+        auto next = carrier_->next();
+        if (!next) {
+            return tl::unexpected(next.error());
         }
-        if (!*carried) {
+        std::optional<CarriedMessage>& carried = *next;
+        if (!carried) {
             break;
         }
-        if (const auto taken = take(**carried, Clock::now()); !taken) {
+        if (const auto taken = take(*carried, Clock::now()); !taken) {
             return taken;
         }
         const Bytes reply = carrier_->take_reply();
@@ -228,7 +231,7 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
         send(Credit{.bytes = std::exchange(uncredited_bytes_, 0)});
     }
     if (hello_ && !options_.by_view) {
-        ask(now);
+        ask(hello_->limits, now);
     }
     return {};
 }
@@ -236,7 +239,7 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
 Result<void> LoadClient::take(CarriedMessage& carried, Clock::time_point now) {
     AnyMessage& message = carried.message;
     if (const auto* chunk = std::get_if<ChunkAnswer>(&message); chunk != nullptr && hello_) {
-        take_chunk(*chunk, carried.payload, now);
+        take_chunk(*hello_, *chunk, carried.payload, now);
         return {};
     }
     if (const auto* failure = std::get_if<Failure>(&message)) {
@@ -250,8 +253,8 @@ Result<void> LoadClient::take(CarriedMessage& carried, Clock::time_point now) {
         send(Pong{.nonce = ping->nonce});
         return {};
     }
-    if (const auto* world = std::get_if<WorldAnswer>(&message)) {
-        handlers_.world(*world);
+    if (const auto* world = std::get_if<WorldAnswer>(&message); world != nullptr && hello_) {
+        handlers_.world(*world, *hello_);
         return {};
     }
     if (const auto* goodbye = std::get_if<Goodbye>(&message)) {
@@ -305,8 +308,8 @@ bool LoadClient::answered(std::uint32_t request_id, ChunkPos key) {
     return true;
 }
 
-void LoadClient::take_chunk(const ChunkAnswer& answer, std::span<const std::byte> payload,
-                            Clock::time_point now) {
+void LoadClient::take_chunk(const ServerHello& world, const ChunkAnswer& answer,
+                            std::span<const std::byte> payload, Clock::time_point now) {
     if (options_.by_view) {
         uncredited_bytes_ += payload.size();
     } else if (!answered(answer.request_id, answer.key)) {
@@ -318,7 +321,7 @@ void LoadClient::take_chunk(const ChunkAnswer& answer, std::span<const std::byte
     counts_.bytes += payload.size();
     const bool is_decoded = counts_.chunks % options_.decode_every == 0;
     const auto content =
-        is_decoded ? read_chunk(answer, payload, *hello_) : Result<ChunkContent>(ChunkContent{});
+        is_decoded ? read_chunk(answer, payload, world) : Result<ChunkContent>(ChunkContent{});
     const auto decoded = Clock::now();
     if (!content) {
         ++counts_.undecodable;

@@ -70,7 +70,7 @@ class LoadClient {
     struct Handlers {
         /// Every chunk that decoded.
         std::function<void(const ChunkAnswer&, std::span<const std::byte>)> chunk;
-        std::function<void(const WorldAnswer&)> world;
+        std::function<void(const WorldAnswer&, const ServerHello&)> world;
     };
 
     LoadClient(const LoadClientOptions& options, const MovementStart& movement,
@@ -120,14 +120,14 @@ class LoadClient {
     };
 
     void send(const AnyMessage& message);
-    void look(Clock::time_point now);
-    void change_wants(const ViewSet& next, Clock::time_point now);
-    void ask(Clock::time_point now);
+    void look(const ServerHello& world, Clock::time_point now);
+    void change_wants(const ServerHello& world, const ViewSet& next, Clock::time_point now);
+    void ask(const WireLimits& limits, Clock::time_point now);
     void account_wanting(Clock::time_point now);
     void settle(ChunkPos key);
     Result<void> take(CarriedMessage& carried, Clock::time_point now);
-    void take_chunk(const ChunkAnswer& answer, std::span<const std::byte> payload,
-                    Clock::time_point now);
+    void take_chunk(const ServerHello& world, const ChunkAnswer& answer,
+                    std::span<const std::byte> payload, Clock::time_point now);
     Result<void> take_failure(const Failure& failure, Clock::time_point now);
     void take_forget(const ChunkForget& forget, Clock::time_point now);
     void miss(std::size_t count, Clock::time_point now);

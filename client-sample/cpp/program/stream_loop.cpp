@@ -34,12 +34,14 @@ namespace {
 /// Little, so that all connections are read in turn even when decoding is slower than the server.
 constexpr std::size_t kReceiveBytes = std::size_t{16} << 10U;
 
+using TlsStream = asio::ssl::stream<tcp::socket&>;
+
 /// A connection; kept alive by the operations that are under way.
 struct Stream {
     explicit Stream(asio::io_context& context) : socket(context) {}
 
     tcp::socket socket;
-    std::optional<asio::ssl::stream<tcp::socket&>> tls;
+    std::optional<TlsStream> tls;
     Bytes decrypted;  ///< where TLS reads to, which must stay while it waits
     bool is_open = false;
     bool is_ended = false;
@@ -77,22 +79,21 @@ struct StreamLoop::State {
         stream.socket.close(ignored);
     }
 
-    void shake_hands(StreamId id) {
+    void shake_hands(StreamId id, asio::ssl::context& with) {
         const auto& stream = streams[id];
-        stream->tls.emplace(stream->socket, *tls_context);
-        if (const auto named = demand_host(stream->tls->native_handle(), host); !named) {
+        TlsStream& tls = stream->tls.emplace(stream->socket, with);
+        if (const auto named = demand_host(tls.native_handle(), host); !named) {
             end(id, named.error().message);
             return;
         }
         stream->decrypted.resize(kReceiveBytes);
-        stream->tls->async_handshake(asio::ssl::stream_base::client,
-                                     [this, id, stream](error_code error) {
-                                         if (error && !stream->is_ended) {
-                                             end(id, "TLS: " + error.message());
-                                         } else if (!stream->is_ended) {
-                                             begin(id);
-                                         }
-                                     });
+        tls.async_handshake(asio::ssl::stream_base::client, [this, id, stream](error_code error) {
+            if (error && !stream->is_ended) {
+                end(id, "TLS: " + error.message());
+            } else if (!stream->is_ended) {
+                begin(id);
+            }
+        });
     }
 
     void begin(StreamId id) {
@@ -120,8 +121,8 @@ struct StreamLoop::State {
     }
 
     void read(StreamId id) {
-        if (streams[id]->tls) {
-            read_tls(id);
+        if (std::optional<TlsStream>& tls = streams[id]->tls) {
+            read_tls(id, *tls);
             return;
         }
         // Waiting takes no buffer, so thousands of idle connections hold none. (Those by TLS do,
@@ -143,11 +144,11 @@ struct StreamLoop::State {
             });
     }
 
-    void read_tls(StreamId id) {
+    void read_tls(StreamId id, TlsStream& tls) {
         const auto& stream = streams[id];
-        stream->tls->async_read_some(asio::buffer(stream->decrypted), [this, id, stream](
-                                                                          error_code error,
-                                                                          std::size_t size_bytes) {
+        tls.async_read_some(asio::buffer(stream->decrypted), [this, id, stream](
+                                                                 error_code error,
+                                                                 std::size_t size_bytes) {
             if (!stream->is_ended) {
                 take(id, error, std::span<const std::byte>(stream->decrypted).first(size_bytes));
             }
@@ -174,8 +175,8 @@ struct StreamLoop::State {
             }
             write(id);
         };
-        if (stream->tls) {
-            asio::async_write(*stream->tls, front, written);
+        if (std::optional<TlsStream>& tls = stream->tls) {
+            asio::async_write(*tls, front, written);
         } else {
             asio::async_write(stream->socket, front, written);
         }
@@ -194,9 +195,8 @@ Result<StreamLoop> StreamLoop::open(const Target& target, Handlers handlers, Dea
     state->peer = target.host + ":" + std::to_string(target.port);
     state->handlers = std::move(handlers);
     if (target.tls.enabled) {
-        state->tls_context.emplace(asio::ssl::context::tls_client);
-        if (const auto trusted =
-                demand_trust(state->tls_context->native_handle(), target.tls.ca_file);
+        asio::ssl::context& context = state->tls_context.emplace(asio::ssl::context::tls_client);
+        if (const auto trusted = demand_trust(context.native_handle(), target.tls.ca_file);
             !trusted) {
             return tl::unexpected(trusted.error());
         }
@@ -241,7 +241,7 @@ StreamLoop::StreamId StreamLoop::connect() {
                                 return;
                             }
                             if (state.tls_context) {
-                                state.shake_hands(id);
+                                state.shake_hands(id, *state.tls_context);
                             } else {
                                 state.begin(id);
                             }

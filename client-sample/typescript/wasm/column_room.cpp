@@ -3,6 +3,7 @@
 #include "generator/mesh/mesh.h"
 #include "generator/mesh/mesh_world.h"
 #include "generator/mesh/water_surface.h"
+#include "generator/volume/chunk.h"
 #include "generator/volume/chunk_codec.h"
 #include "generator/volume/limit.h"
 #include "generator/volume/stack.h"
@@ -15,6 +16,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -142,7 +144,15 @@ Result<bool> ColumnRoom::put_chunk(Chunk chunk) {
     if (!held.is_complete()) {
         return false;
     }
-    if (auto joined = join(held); !joined) {
+    std::vector<Chunk> chunks;
+    chunks.reserve(held.chunks.size());
+    for (std::optional<Chunk>& chunk : held.chunks) {
+        if (chunk) {  // as all are
+            chunks.push_back(*std::move(chunk));
+        }
+    }
+    held.chunks.clear();
+    if (auto joined = join(held, chunks); !joined) {
         stacks_.erase(stack_of(position));
         return tl::unexpected(joined.error());
     }
@@ -168,11 +178,11 @@ Result<std::uint16_t> ColumnRoom::intern(const PaletteEntry& entry) {
     return id;
 }
 
-Result<void> ColumnRoom::join(HeldStack& stack) {
+Result<void> ColumnRoom::join(HeldStack& stack, std::span<const Chunk> chunks) {
     const std::int32_t side = world_.grid.side;
-    std::vector<std::vector<std::uint16_t>> ids(stack.chunks.size());
-    for (std::size_t y = 0; y < stack.chunks.size(); ++y) {
-        const Chunk& chunk = *stack.chunks[y];
+    std::vector<std::vector<std::uint16_t>> ids(chunks.size());
+    for (std::size_t y = 0; y < chunks.size(); ++y) {
+        const Chunk& chunk = chunks[y];
         const std::span<const PaletteEntry> entries =
             chunk.uniform ? std::span(&chunk.uniform_content, 1) : std::span(chunk.palette);
         for (const PaletteEntry& entry : entries) {
@@ -190,8 +200,8 @@ Result<void> ColumnRoom::join(HeldStack& stack) {
     for (std::int32_t z = 0; z < side; ++z) {
         for (std::int32_t x = 0; x < side; ++x) {
             const std::size_t first = grid.limits.size();
-            for (std::size_t y = 0; y < stack.chunks.size(); ++y) {
-                const Chunk& chunk = *stack.chunks[y];
+            for (std::size_t y = 0; y < chunks.size(); ++y) {
+                const Chunk& chunk = chunks[y];
                 const std::int32_t height256 = chunk.height * kUnitsPerVoxel;
                 const std::int32_t floor256 = static_cast<std::int32_t>(y) * height256;
                 part.clear();
@@ -215,7 +225,6 @@ Result<void> ColumnRoom::join(HeldStack& stack) {
         }
     }
     grid.limits.shrink_to_fit();
-    stack.chunks.clear();
     return {};
 }
 

@@ -86,7 +86,7 @@ class ColumnRoom {
 
     Result<HeldStack*> stack_to_fill(ChunkPos position);
     Result<bool> put_chunk(Chunk chunk);
-    Result<void> join(HeldStack& stack);
+    Result<void> join(HeldStack& stack, std::span<const Chunk> chunks);
     Result<std::uint16_t> intern(const PaletteEntry& entry);
     void find_tile(Stack& out, StackPos position, MeshOf what) const;
     std::span<const Limit> lattice_column(std::int32_t lod, std::int64_t x, std::int64_t z) const;
