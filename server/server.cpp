@@ -26,6 +26,7 @@
 #include "server/metrics.h"
 #include "server/net/endpoint.h"
 #include "server/net/http_session.h"
+#include "server/net/listen_options.h"
 #include "server/net/listener.h"
 #include "server/net/native_protocol.h"
 #include "server/net/outbox.h"

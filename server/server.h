@@ -9,7 +9,7 @@
 #include "server/http/viewer_files.h"
 #include "server/log.h"
 #include "server/net/http_session.h"
-#include "server/net/listener.h"
+#include "server/net/listen_options.h"
 #include "server/net/session.h"
 #include "server/net/tls.h"
 

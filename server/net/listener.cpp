@@ -1,13 +1,11 @@
 #include "server/net/listener.h"
 
-#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
 #include "protocol/base/result.h"
-#include "server/net/admission.h"
 #include "server/net/byte_protocol.h"
-#include "server/net/channel.h"
+#include "server/net/client_connection.h"
 #include "server/net/endpoint.h"
-#include "server/net/tls.h"
+#include "server/net/listen_options.h"
 
 #include <boost/asio.hpp>
 
@@ -15,15 +13,10 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
-#include <cstdint>
 #include <exception>
-#include <functional>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 #include <thread>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -33,7 +26,7 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
-/// With the loop's own executor: the usual one is looked up anew at each read.
+/// As client_connection.cpp has it, which takes no other.
 using Socket = asio::basic_stream_socket<tcp, asio::io_context::executor_type>;
 using Timer = asio::basic_waitable_timer<std::chrono::steady_clock,
                                          asio::wait_traits<std::chrono::steady_clock>,
@@ -41,362 +34,14 @@ using Timer = asio::basic_waitable_timer<std::chrono::steady_clock,
 using boost::system::error_code;
 using Clock = ByteProtocol::Clock;
 
-constexpr std::size_t kReadBytes = 4096;
-/// Writes of one connection in a row, before the others of its thread have their turn.
-constexpr int kWritesInARowMax = 8;
-/// After the last byte is written, the client's own last bytes are read and thrown away for so
-/// long: closing on unread bytes would reset the connection, and the client would lose our last
-/// message.
-constexpr std::chrono::milliseconds kLinger{2'000};
 constexpr std::chrono::milliseconds kAcceptRetry{100};
-
-class Connection;
 
 /// One io thread's loop and the connections that live on it.
 struct Loop {
     asio::io_context context{1};
     asio::executor_work_guard<asio::io_context::executor_type> guard{context.get_executor()};
     Timer timer{context};
-    std::unordered_set<std::shared_ptr<Connection>> connections;  // the loop's thread only
-    bool draining = false;                                        // the loop's thread only
-    Bytes plain;                                                  // scratch, the loop's thread only
-};
-
-struct Shared {
-    const ListenOptions options;
-    Admission admission;
-    TrafficCounters traffic = {};
-    std::atomic<std::uint64_t> next_id = 1;
-
-    void event(const std::string& text) const {
-        if (options.on_event) {
-            options.on_event(text);
-        }
-    }
-
-    void fault(const std::string& text) const {
-        if (options.on_fault) {
-            options.on_fault(text);
-        } else {
-            event(text);
-        }
-    }
-};
-
-/// A socket and what runs over it. Everything on the loop's thread.
-class Connection : public std::enable_shared_from_this<Connection> {
-  public:
-    Connection(Shared& shared, Loop& loop, const ListenPort& port, Socket socket,
-               std::string address)
-        : shared_(shared),
-          loop_(loop),
-          port_(port),
-          socket_(std::move(socket)),
-          origin_{.id = shared.next_id.fetch_add(1, std::memory_order_relaxed),
-                  .address = std::move(address)},
-          connected_(Clock::now()) {}
-
-    /// Already admitted under its address.
-    void start() {
-        loop_.connections.insert(shared_from_this());
-        guarded([this] {
-            error_code ignored;
-            socket_.set_option(tcp::no_delay(true), ignored);
-            socket_.non_blocking(true, ignored);
-            std::unique_ptr<TlsChannel> tls;
-            if (port_.tls != nullptr) {
-                auto accepted = port_.tls->accept();
-                if (!accepted) {
-                    reason_ = accepted.error().message;
-                    close();
-                    return;
-                }
-                tls = *std::move(accepted);
-            }
-            channel_.emplace(port_.make(origin_, post(), Clock::now()), std::move(tls),
-                             loop_.plain);
-            if (loop_.draining) {
-                protocol().drain();
-            }
-        });
-    }
-
-    void drain() {
-        guarded([this] { protocol().drain(); });
-    }
-
-    void tick(Clock::time_point now) {
-        guarded([this, now] {
-            if (linger_until_ && now > *linger_until_) {
-                close();
-            } else if (channel_->is_shaking_hands()) {
-                if (now - connected_ > shared_.options.tls_handshake) {
-                    shared_.traffic.tls_failed.fetch_add(1, std::memory_order_relaxed);
-                    reason_ = "no TLS handshake in time";
-                    close();
-                }
-            } else {
-                protocol().tick(now);
-            }
-        });
-    }
-
-    void close() {
-        if (!socket_.is_open()) {
-            return;
-        }
-        error_code ignored;
-        socket_.close(ignored);
-        if (channel_) {
-            protocol().end();
-        }
-        shared_.admission.leave(origin_.address);
-        loop_.connections.erase(shared_from_this());
-        report();
-    }
-
-  private:
-    ByteProtocol& protocol() { return channel_->protocol(); }
-
-    const ByteProtocol& protocol() const { return channel_->protocol(); }
-
-    /// Runs a step of the protocol and then whatever reading and writing follows from it. One of
-    /// the places where exceptions end: they end the connection.
-    template <typename Step>
-    void guarded(const Step& step) {
-        const auto alive = shared_from_this();
-        try {
-            step();
-            pump();
-        } catch (const std::exception& error) {
-            fail_with(error);
-        }
-    }
-
-    void fail_with(const std::exception& error) {
-        reason_ = std::string("failed: ") + error.what();
-        close();
-    }
-
-    void report() const {
-        const std::string name = channel_ ? protocol().client_name() : std::string();
-        const std::string reason =
-            reason_.empty() && channel_ ? protocol().close_reason() : reason_;
-        std::string text =
-            port_.name + " session " + std::to_string(origin_.id) + " of " + origin_.address;
-        text += name.empty() ? "" : " \"" + name + "\"";
-        text += " ended";
-        text += reason.empty() ? "" : ": " + reason;
-        if (reason.starts_with(to_string(ErrorCode::malformed))) {
-            shared_.fault(text);
-        } else {
-            shared_.event(text);
-        }
-    }
-
-    ConnectionPost post() {
-        return [weak = weak_from_this(),
-                executor = loop_.context.get_executor()](std::function<void()> step) {
-            asio::post(executor, [weak, step = std::move(step)] {
-                if (const auto self = weak.lock(); self && self->socket_.is_open()) {
-                    self->guarded(step);
-                }
-            });
-        };
-    }
-
-    void pump() {
-        if (!socket_.is_open() || !channel_) {
-            return;
-        }
-        int writes = 0;
-        while (!protocol().is_dead() && !writing_ && writes < kWritesInARowMax && write_some()) {
-            ++writes;
-        }
-        if (!socket_.is_open()) {
-            return;
-        }
-        if (protocol().is_dead()) {
-            close();
-            return;
-        }
-        if (writes == kWritesInARowMax) {
-            wait_for_room();  // which there is; but others come first
-        }
-        if (!writing_ && protocol().is_closing() && !linger_until_ && !channel_->has_output()) {
-            shut_down();
-        }
-        wake_later();
-        if (!reading_ &&
-            (linger_until_ || protocol().wants_input() || channel_->is_shaking_hands())) {
-            read_soon();
-        }
-    }
-
-    /// Has the protocol called when it wants to be.
-    void wake_later() {
-        const auto at = protocol().wake_at();
-        if (!at || (wakes_at_ && *wakes_at_ <= *at)) {
-            return;
-        }
-        if (!wake_timer_) {
-            wake_timer_.emplace(socket_.get_executor());
-        }
-        wakes_at_ = at;
-        wake_timer_->expires_at(*at);
-        wake_timer_->async_wait([weak = weak_from_this()](error_code stopped) {
-            const auto self = weak.lock();
-            if (stopped || !self || !self->socket_.is_open()) {
-                return;
-            }
-            self->wakes_at_.reset();
-            self->guarded([&] { self->protocol().tick(Clock::now()); });
-        });
-    }
-
-    void shut_down() {
-        error_code ignored;
-        if (const auto farewell = channel_->farewell(); !farewell.empty()) {
-            socket_.write_some(asio::buffer(farewell.data(), farewell.size()), ignored);
-        }
-        linger_until_ = Clock::now() + kLinger;
-        socket_.shutdown(Socket::shutdown_send, ignored);
-    }
-
-    /// Reads when the other connections that have something to do have had their turn. By then a
-    /// busy client's next request is often there; read at once, two in three found nothing.
-    void read_soon() {
-        reading_ = true;
-        asio::post(loop_.context, [self = shared_from_this()] {
-            try {
-                if (self->socket_.is_open()) {
-                    self->read();
-                }
-            } catch (const std::exception& error) {
-                self->fail_with(error);
-            }
-        });
-    }
-
-    void read() {
-        socket_.async_read_some(
-            asio::buffer(read_buffer_),
-            [self = shared_from_this()](error_code error, std::size_t size_bytes) {
-                self->reading_ = false;
-                if (error && (error != asio::error::eof || self->linger_until_)) {
-                    self->close();
-                    return;
-                }
-                self->guarded([&] {
-                    if (error) {
-                        self->input_ended();
-                    } else {
-                        self->received(std::span(self->read_buffer_).first(size_bytes));
-                    }
-                });
-            });
-    }
-
-    void input_ended() {
-        if (channel_->is_shaking_hands()) {
-            close();
-            return;
-        }
-        protocol().input_ended();
-        if (protocol().is_closing() || protocol().is_dead()) {
-            return;
-        }
-        if (protocol().wants_input()) {
-            close();  // it would read for ever
-            return;
-        }
-        // It has something to say yet. Nobody reads from now on, so a reset must be waited for.
-        socket_.async_wait(Socket::wait_error,
-                           [self = shared_from_this()](error_code) { self->close(); });
-    }
-
-    void received(std::span<const std::byte> bytes) {
-        shared_.traffic.bytes_in.fetch_add(bytes.size(), std::memory_order_relaxed);
-        if (linger_until_) {
-            return;
-        }
-        if (const auto outcome = channel_->receive(bytes); !outcome) {
-            shared_.traffic.tls_failed.fetch_add(1, std::memory_order_relaxed);
-            reason_ = outcome.error().message;
-            error_code ignored;
-            const auto alert = channel_->alert();
-            socket_.write_some(asio::buffer(alert.data(), alert.size()), ignored);
-            close();
-            return;
-        }
-        if (channel_->input_ended() && socket_.is_open()) {
-            input_ended();
-        }
-    }
-
-    /// Writes what the socket takes at once. False if nothing is left to do, or the rest must wait.
-    bool write_some() {
-        const auto output = channel_->output();
-        if (!output) {
-            reason_ = output.error().message;
-            close();
-            return false;
-        }
-        if (output->empty()) {
-            return false;
-        }
-        std::size_t size = 0;
-        buffers_.clear();
-        for (const auto part : *output) {
-            buffers_.emplace_back(part.data(), part.size());
-            size += part.size();
-        }
-        error_code error;
-        const std::size_t sent = socket_.write_some(buffers_, error);
-        if (error == asio::error::would_block || error == asio::error::try_again) {
-            wait_for_room();
-            return false;
-        }
-        if (error) {
-            close();
-            return false;
-        }
-        shared_.traffic.bytes_out.fetch_add(sent, std::memory_order_relaxed);
-        channel_->wrote(sent);
-        if (sent < size) {
-            wait_for_room();
-            return false;
-        }
-        return true;
-    }
-
-    void wait_for_room() {
-        writing_ = true;
-        socket_.async_wait(Socket::wait_write, [self = shared_from_this()](error_code error) {
-            self->writing_ = false;
-            if (error) {
-                self->close();
-                return;
-            }
-            self->guarded([] {});
-        });
-    }
-
-    Shared& shared_;
-    Loop& loop_;
-    const ListenPort& port_;
-    Socket socket_;
-    const ConnectionOrigin origin_;
-    const Clock::time_point connected_;
-    std::optional<Channel> channel_;  ///< until `start` there is none
-    std::array<std::byte, kReadBytes> read_buffer_{};
-    std::vector<asio::const_buffer> buffers_;
-    bool reading_ = false;
-    bool writing_ = false;
-    std::optional<Clock::time_point> linger_until_;
-    std::optional<Timer> wake_timer_;  ///< made when it is needed first
-    std::optional<Clock::time_point> wakes_at_;
-    std::string reason_;  ///< why we close, if the protocol doesn't know
+    LoopConnections connections;  // the loop's thread only
 };
 
 /// Tells a client that there is no room, and then reads what it sends until it closes or kLinger is
@@ -453,7 +98,7 @@ class Refusal : public std::enable_shared_from_this<Refusal> {
     const ListenPort& port_;
     Socket socket_;
     Timer timer_;
-    std::array<std::byte, kReadBytes> read_buffer_{};
+    std::array<std::byte, kSocketReadBytes> read_buffer_{};
 };
 
 /// A port and its listening socket, which lives on the first loop.
@@ -541,7 +186,7 @@ struct Listener::Impl {
                 close_gates(loop);
                 loop.timer.cancel();
                 for (const auto& connection :
-                     std::vector(loop.connections.begin(), loop.connections.end())) {
+                     std::vector(loop.connections.open.begin(), loop.connections.open.end())) {
                     connection->close();
                 }
             });
@@ -626,10 +271,10 @@ struct Listener::Impl {
             });
             return;
         }
-        std::shared_ptr<Connection> connection;
+        std::shared_ptr<ClientConnection> connection;
         try {
-            connection =
-                std::make_shared<Connection>(shared, loop, gate.port, std::move(socket), address);
+            connection = make_client_connection(shared, loop.connections, gate.port,
+                                                std::move(socket), address);
         } catch (...) {
             shared.admission.leave(address);
             throw;
@@ -647,7 +292,7 @@ struct Listener::Impl {
             tick(loop);
             const auto now = Clock::now();
             for (const auto& connection :
-                 std::vector(loop.connections.begin(), loop.connections.end())) {
+                 std::vector(loop.connections.open.begin(), loop.connections.open.end())) {
                 connection->tick(now);
             }
         });
@@ -662,7 +307,7 @@ struct Listener::Impl {
         }
     }
 
-    Shared shared;
+    ConnectionContext shared;
     std::atomic<int> lingering_refusals = 0;  // before the loops, whose handlers count it down
     std::vector<std::unique_ptr<Loop>> loops;
     std::vector<std::unique_ptr<Gate>> gates;
@@ -715,9 +360,9 @@ bool Listener::drain(std::chrono::milliseconds time) {
     for (const auto& loop : impl_->loops) {
         asio::post(loop->context, [this, &loop = *loop] {
             impl_->close_gates(loop);
-            loop.draining = true;
+            loop.connections.draining = true;
             for (const auto& connection :
-                 std::vector(loop.connections.begin(), loop.connections.end())) {
+                 std::vector(loop.connections.open.begin(), loop.connections.open.end())) {
                 connection->drain();
             }
         });
