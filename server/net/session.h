@@ -1,5 +1,6 @@
 // One client's session, from its hello to its goodbye, without a socket: bytes in, an outbox out,
-// the time given. A transport (listener.cpp) feeds it, writes the outbox and closes when told.
+// the time given. A transport (client_connection.cpp) feeds it, writes the outbox and closes when
+// told.
 //
 //     hello ──ClientHello──> open ──drain──> finishing ──last answer──> closing ──> dead
 //       └──── malformed, too late, wrong version ─────────────────────────┘
@@ -10,7 +11,8 @@
 // them: a client that doesn't read makes no work and holds little memory. Answers come back through
 // `post` on the session's own thread.
 //
-// The view's part of the session is in session_view.cpp.
+// What the session does for its requests is in session_requests.cpp, for its view in
+// session_view.cpp.
 #pragma once
 
 #include "protocol/wire/frame.h"
@@ -171,12 +173,12 @@ class Session : public std::enable_shared_from_this<Session> {
     void go_on_later();
 
     bool view_has_credit() const;
-    bool view_may_ask() const;
-    bool view_is_next() const;
-    bool submit_of_view();
-    void answer_of_view(const Wish& wish, const Result<Answer>& result);
+    View* view_to_ask();
+    View* view_if_next();
+    bool submit_of_view(View& view);
+    void answer_of_view(View& view, const Wish& wish, const Result<Answer>& result);
     bool has_room_for(const ServedChunk& served) const;
-    void drop_unwanted(bool all);
+    void drop_unwanted(View& view, bool all);
     void tell_forgotten();
     void end_view();
     void set_rate();

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -53,22 +54,21 @@ void Session::handle_one(const ViewUpdate& update) {
         log_.end(number);
         return;
     }
-    if (!view_) {
-        const ServerHello& world = context_.hello;
-        view_.emplace(
-            ViewWorld{.side = world.chunk_side,
-                      .chunk_height = world.chunk_height,
-                      .height_bound_voxels = world.height_bound_voxels,
-                      .levels = world.levels},
-            ViewBounds{.radius_max = caps_.view_radius_max, .squares_max = caps_.view_squares_max});
-    }
+    const ServerHello& world = context_.hello;
+    View& view = view_ ? *view_
+                       : view_.emplace(ViewWorld{.side = world.chunk_side,
+                                                 .chunk_height = world.chunk_height,
+                                                 .height_bound_voxels = world.height_bound_voxels,
+                                                 .levels = world.levels},
+                                       ViewBounds{.radius_max = caps_.view_radius_max,
+                                                  .squares_max = caps_.view_squares_max});
     log_.end(std::exchange(view_number_, number));
-    view_->update(update);
+    view.update(update);
     const bool all_again = !is_same_kind(update, last_update_);
     last_update_ = update;
     last_update_.radius_chunks = {};
     set_rate();
-    drop_unwanted(all_again);
+    drop_unwanted(view, all_again);
     submit();
 }
 
@@ -89,7 +89,7 @@ void Session::set_rate() {
 
 /// What is under way or waits to be written and has left the view is dropped; what stays gets the
 /// urgency that it has now.
-void Session::drop_unwanted(bool all) {
+void Session::drop_unwanted(View& view, bool all) {
     for (auto at = under_way_.begin(); at != under_way_.end();) {
         Wish& wish = at->second;
         if (!wish.is_of_view()) {
@@ -97,13 +97,13 @@ void Session::drop_unwanted(bool all) {
             continue;
         }
         const ChunkPos key = std::get<ChunkKey>(wish.key).position;
-        if (all || !view_->contains(key)) {
+        if (all || !view.contains(key)) {
             context_.service->cancel(wish.key, at->first);
             at = under_way_.erase(at);
             --view_under_way_;
             continue;
         }
-        const std::int32_t priority = view_->priority_of(stack_of(key));
+        const std::int32_t priority = view.priority_of(stack_of(key));
         if (priority != wish.priority) {
             wish.priority = priority;
             context_.service->change_priority(wish.key, at->first, priority);
@@ -111,7 +111,7 @@ void Session::drop_unwanted(bool all) {
         ++at;
     }
     const auto withdrawn =
-        outbox_.withdraw([&](ChunkPos key) { return all || !view_->contains(key); });
+        outbox_.withdraw([&](ChunkPos key) { return all || !view.contains(key); });
     uncredited_bytes_ -= std::min(uncredited_bytes_, withdrawn.payload_bytes);
     byte_rate_.take(-static_cast<double>(withdrawn.bytes));
 }
@@ -149,26 +149,31 @@ bool Session::view_has_credit() const {
            (uncredited_bytes_ == 0 && view_under_way_ == 0);
 }
 
-/// has_room has looked at everything but the view's own state and credit.
-bool Session::view_may_ask() const {
+/// The view if it may ask for a chunk now, else null. has_room has looked at everything but the
+/// view's own state and credit.
+View* Session::view_to_ask() {
     if (stage_ != Stage::open || !view_ || !view_->has_wish() || view_->has_forgotten() ||
         view_waits_ || (view_retry_at_ && now_ < *view_retry_at_)) {
-        return false;
+        return nullptr;
     }
-    return view_has_credit();
+    return view_has_credit() ? &*view_ : nullptr;
 }
 
-bool Session::view_is_next() const {
-    return view_may_ask() &&
-           (waiting_.empty() || view_->next_priority() > waiting_.begin()->second.priority);
+/// The view if it is what may ask next, else null.
+View* Session::view_if_next() {
+    View* const view = view_to_ask();
+    const bool is_first =
+        view != nullptr &&
+        (waiting_.empty() || view->next_priority() > waiting_.begin()->second.priority);
+    return is_first ? view : nullptr;
 }
 
 /// True if it was answered at once.
-bool Session::submit_of_view() {
+bool Session::submit_of_view(View& view) {
     view_retry_at_.reset();
-    const std::int32_t priority = view_->next_priority();
+    const std::int32_t priority = view.next_priority();
     const Wish wish{.request_id = 0,
-                    .key = ChunkKey{.position = view_->take(),
+                    .key = ChunkKey{.position = view.take(),
                                     .format = last_update_.format,
                                     .without_flow = last_update_.without_flow},
                     .known_etag = {},
@@ -176,11 +181,14 @@ bool Session::submit_of_view() {
                     .rank = {}};
     const auto outcome = ask(wish);
     if (!outcome) {
-        answer_of_view(wish, tl::unexpected(outcome.error()));
-    } else if (*outcome) {
-        answer_of_view(wish, **outcome);
+        answer_of_view(view, wish, tl::unexpected(outcome.error()));
+        return true;
     }
-    return !outcome || *outcome;
+    const std::optional<Answer>& at_hand = *outcome;
+    if (at_hand) {
+        answer_of_view(view, wish, *at_hand);
+    }
+    return at_hand.has_value();
 }
 
 bool Session::has_room_for(const ServedChunk& served) const {
@@ -193,12 +201,12 @@ bool Session::has_room_for(const ServedChunk& served) const {
 }
 
 /// Sends it, or gives it back to the view: by then it is in the cache.
-void Session::answer_of_view(const Wish& wish, const Result<Answer>& result) {
+void Session::answer_of_view(View& view, const Wish& wish, const Result<Answer>& result) {
     const ChunkPos key = std::get<ChunkKey>(wish.key).position;
     if (!result) {
         const ErrorCode code = result.error().code;
         if (code == ErrorCode::busy || code == ErrorCode::draining) {
-            view_->give_back(key);
+            view.give_back(key);
             view_retry_at_ = now_ + std::chrono::milliseconds(context_.service->retry_after_ms());
             return;
         }
@@ -206,8 +214,8 @@ void Session::answer_of_view(const Wish& wish, const Result<Answer>& result) {
         return;
     }
     const auto& served = std::get<ServedChunk>(*result);
-    if (stage_ != Stage::open || view_->has_forgotten() || !has_room_for(served)) {
-        view_->give_back(key);
+    if (stage_ != Stage::open || view.has_forgotten() || !has_room_for(served)) {
+        view.give_back(key);
         view_waits_ = true;
         return;
     }
