@@ -4,7 +4,7 @@
 #include "protocol/wire/limits.h"
 #include "server/chunks/worker_pool.h"
 #include "server/http/tiles3d.h"
-#include "server/net/listener.h"
+#include "server/net/listen_options.h"
 #include "server/net/session_caps.h"
 #include "server/toml_settings.h"
 
@@ -68,8 +68,9 @@ Result<void> check_text(const Setting& setting, std::string_view text) {
     return {};
 }
 
-std::vector<Setting> all_settings() {
-    using Config = ServerConfig;
+using Config = ServerConfig;
+
+std::vector<Setting> settings_of_place() {
     return {
         {.key = "world", .help = "World file", .member = &Config::world, .is_path = true},
         {.key = "data",
@@ -107,6 +108,11 @@ std::vector<Setting> all_settings() {
         {.key = "publish_world",
          .help = "May clients have the world file?",
          .member = &Config::publish_world},
+    };
+}
+
+std::vector<Setting> settings_of_machine() {
+    return {
         {.key = "workers",
          .help = "Threads that make chunks",
          .member = &Config::workers,
@@ -133,6 +139,11 @@ std::vector<Setting> all_settings() {
          .member = &Config::memory_max_mib,
          .least = 0,
          .most = kMibMax},
+    };
+}
+
+std::vector<Setting> settings_of_clients() {
+    return {
         {.key = "sessions_max",
          .help = "Connections at a time, over all ports",
          .member = &Config::sessions_max,
@@ -170,6 +181,11 @@ std::vector<Setting> all_settings() {
          .member = &Config::tileset_levels,
          .least = kSubtreeLevels,
          .most = kTilesetLevels},
+    };
+}
+
+std::vector<Setting> settings_of_time_and_log() {
+    return {
         {.key = "header_timeout_s",
          .help = "Seconds for a client's greeting, or a request's headers",
          .member = &Config::header_timeout_s,
@@ -199,6 +215,16 @@ std::vector<Setting> all_settings() {
          .member = &Config::log_level,
          .allowed = {"debug", "info", "warning", "error", "off"}},
     };
+}
+
+/// In the order in which they are shown.
+std::vector<Setting> all_settings() {
+    std::vector<Setting> all;
+    for (const auto& part : {settings_of_place(), settings_of_machine(), settings_of_clients(),
+                             settings_of_time_and_log()}) {
+        all.insert(all.end(), part.begin(), part.end());
+    }
+    return all;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -83,36 +84,40 @@ Result<EncodedChunk> decode_chunk_record(std::span<const std::byte> bytes, std::
     }
     const auto contents = bytes.first(bytes.size() - kHashBytes);
     ByteReader tail(bytes.last(kHashBytes));
-    const std::uint64_t low = *tail.fixed<std::uint64_t>();
-    const std::uint64_t high = *tail.fixed<std::uint64_t>();
-    if (hash128(contents) != Hash128{.high = high, .low = low}) {
+    const auto low = tail.fixed<std::uint64_t>();
+    const auto high = tail.fixed<std::uint64_t>();
+    if (!low || !high || hash128(contents) != Hash128{.high = *high, .low = *low}) {
         return fail(ErrorCode::corrupt, "chunk record: checksum does not match");
     }
     ByteReader in(contents);
-    const std::uint8_t version = *in.fixed<std::uint8_t>();
-    if (version != kChunkRecordVersion) {
-        return fail(ErrorCode::version_mismatch,
-                    "chunk record: version " + std::to_string(version));
+    const auto version = in.fixed<std::uint8_t>();
+    const auto status = in.fixed<std::uint8_t>();
+    if (!version || !status) {
+        return fail(ErrorCode::corrupt, "chunk record: cut short");
     }
-    const std::uint8_t status = *in.fixed<std::uint8_t>();
+    if (*version != kChunkRecordVersion) {
+        return fail(ErrorCode::version_mismatch,
+                    "chunk record: version " + std::to_string(*version));
+    }
     EncodedChunk chunk;
-    if (status == static_cast<std::uint8_t>(ChunkStatus::full)) {
+    if (*status == static_cast<std::uint8_t>(ChunkStatus::full)) {
         chunk.status = ChunkStatus::full;
         const auto size_bytes = in.fixed<std::uint32_t>();
-        if (!size_bytes || *size_bytes == 0 || *size_bytes != in.remaining()) {
+        const bool is_rest = size_bytes && *size_bytes > 0 && *size_bytes == in.remaining();
+        const auto payload = is_rest ? in.take(in.remaining()) : std::nullopt;
+        if (!payload) {
             return fail(ErrorCode::corrupt, "chunk record: wrong payload size");
         }
-        const auto payload = *in.take(*size_bytes);
-        chunk.payload = std::make_shared<const Bytes>(payload.begin(), payload.end());
-    } else if (status == static_cast<std::uint8_t>(ChunkStatus::uniform)) {
+        chunk.payload = std::make_shared<const Bytes>(payload->begin(), payload->end());
+    } else if (*status == static_cast<std::uint8_t>(ChunkStatus::uniform)) {
         chunk.status = ChunkStatus::uniform;
         if (!read_composition(chunk.uniform, in, materials)) {
             return fail(ErrorCode::corrupt, "chunk record: bad composition");
         }
-    } else if (status == static_cast<std::uint8_t>(ChunkStatus::empty)) {
+    } else if (*status == static_cast<std::uint8_t>(ChunkStatus::empty)) {
         chunk.status = ChunkStatus::empty;
     } else {
-        return fail(ErrorCode::corrupt, "chunk record: unknown status " + std::to_string(status));
+        return fail(ErrorCode::corrupt, "chunk record: unknown status " + std::to_string(*status));
     }
     if (in.remaining() != 0) {
         return fail(ErrorCode::corrupt, "chunk record: bytes left over");

@@ -26,9 +26,8 @@ Result<std::int64_t> parse_integer(std::string_view text, IntegerBounds bounds) 
     const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
     const std::string_view digits = plus ? text.substr(1) : text;
     std::int64_t value = 0;
-    const char* end = digits.data() + digits.size();
-    const auto [stop, error] = std::from_chars(digits.data(), end, value);
-    if (error == std::errc::invalid_argument || stop != end) {
+    const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::invalid_argument || stop != digits.data() + digits.size()) {
         return fail(ErrorCode::invalid_argument, quoted(text) + " is not an integer");
     }
     if (error == std::errc::result_out_of_range || value < bounds.least || value > bounds.most) {

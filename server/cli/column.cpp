@@ -110,10 +110,11 @@ std::string column_text(const ColumnReport& column) {
                        "     height   flow             kind   composition";
     for (const Limit& limit : column.limits) {
         const PaletteEntry& entry = column.palette[limit.palette_id];
+        const std::string kind(kind_name(entry, column.materials));
         std::array<char, 80> line{};
         std::snprintf(line.data(), line.size(), "\n%11.3f   %4d %4d %4d   %-5s  ",
                       static_cast<double>(limit.y256) / kUnitsPerVoxel, limit.flow.x, limit.flow.y,
-                      limit.flow.z, kind_name(entry, column.materials).data());
+                      limit.flow.z, kind.c_str());
         text += line.data() + percentages(entry.composition, column.materials);
     }
     return text;

@@ -133,12 +133,12 @@ int run_preseed(const PreseedOptions& options) {
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
     print_outcome(options, *outcome, taken.count());
     if (!outcome->whole) {
+        const unsigned long long present = outcome->stacks_generated + outcome->stacks_present;
         std::fprintf(
             stderr,
             "terrane: interrupted after %llu of %llu stacks; run the same command again to "
             "go on from there\n",
-            static_cast<unsigned long long>(outcome->stacks_generated + outcome->stacks_present),
-            static_cast<unsigned long long>(batches->stacks()));
+            present, static_cast<unsigned long long>(batches->stacks()));
         return kExitFailed;
     }
     return kExitDone;

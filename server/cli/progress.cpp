@@ -115,7 +115,7 @@ void Progress::show(std::uint64_t done, Clock::time_point now) {
 
 void Progress::finish() {
     if (drawn_) {
-        std::fputs(kClearLine.data(), out_);
+        std::fwrite(kClearLine.data(), 1, kClearLine.size(), out_);
         std::fflush(out_);
         drawn_ = false;
     }

@@ -46,8 +46,8 @@ std::optional<HttpResponse> ask_service(ChunkService& service, const WorkKey& ke
          .flow = request.flow});
     if (!outcome) {
         question->answer(tl::unexpected(outcome.error()));
-    } else if (*outcome) {
-        question->answer(**outcome);
+    } else if (const std::optional<Answer>& answer = *outcome) {
+        question->answer(*answer);
     } else if (request.stop.stop_possible()) {
         const std::weak_ptr<Question> weak = question;
         question->on_stop.emplace(request.stop, [&service, key, id, weak] {

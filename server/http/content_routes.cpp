@@ -96,8 +96,7 @@ HttpHandler document(TilesetShape shape, std::string_view content_type,
 }
 
 HttpHandler fixed(std::string_view content_type, std::string_view text) {
-    return [response = http_ok(content_type, http_body(text))](
-               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
+    return fixed_answer(content_type, http_body(text));
 }
 
 Result<Bytes> explicit_bytes(const TilesetShape& shape, const TileIndex& tile) {

@@ -141,8 +141,7 @@ std::optional<HttpResponse> answer_column(const RouteContext& context, const Htt
 
 /// The same bytes each time.
 HttpHandler fixed(std::string_view content_type, std::string_view text) {
-    return [response = http_ok(content_type, http_body(text))](
-               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
+    return fixed_answer(content_type, http_body(text));
 }
 
 }  // namespace

@@ -324,6 +324,7 @@ Json components() {
 
 std::vector<std::string> described_paths() {
     std::vector<std::string> paths;
+    paths.reserve(kDescribed.size());
     for (const Described& route : kDescribed) {
         paths.push_back(full_path(route));
     }

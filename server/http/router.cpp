@@ -1,5 +1,6 @@
 #include "server/http/router.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/check.h"
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
@@ -188,6 +189,11 @@ bool etag_matches(std::string_view if_none_match, std::string_view etag) {
         if_none_match.remove_prefix(quote + 1);
         inside = !inside;
     }
+}
+
+HttpHandler fixed_answer(std::string_view content_type, SharedBytes body) {
+    return [response = http_ok(content_type, std::move(body))](
+               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
 }
 
 Router::Router(Hash128 content_id, HttpGuard guard)

@@ -12,6 +12,7 @@
 // stands a literal. The first route that fits is taken. A handler gets the values percent-decoded.
 #pragma once
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
 #include "server/http/http_message.h"
@@ -61,6 +62,9 @@ class RouteParams {
 /// of it once, whatever happens; may throw.
 using HttpHandler = std::function<std::optional<HttpResponse>(
     const HttpRequest& request, const RouteParams& params, const HttpLater& later)>;
+
+/// Gives the same answer to everybody.
+HttpHandler fixed_answer(std::string_view content_type, SharedBytes body);
 
 struct Route {
     std::string path;                               ///< the pattern

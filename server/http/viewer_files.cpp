@@ -44,16 +44,11 @@ constexpr std::string_view kIndexPage = R"(<!doctype html>
 </html>
 )";
 
-HttpHandler file_handler(std::string_view content_type, SharedBytes body) {
-    return [response = http_ok(content_type, std::move(body))](
-               const HttpRequest&, const RouteParams&, const HttpLater&) { return response; };
-}
-
 void add_file(Router& router, std::string path, const ViewerFile& file) {
     router.add({.path = std::move(path),
                 .caching = HttpCaching::revalidate,
                 .needs_token = false,
-                .handler = file_handler(file.content_type, file.body)});
+                .handler = fixed_answer(file.content_type, file.body)});
 }
 
 /// A route's pattern must not be read out of a file's name.

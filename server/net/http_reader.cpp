@@ -161,17 +161,17 @@ struct HttpReader::Impl {
     }
 
     /// The parser has all of a request.
-    tl::expected<ReceivedRequest*, HttpFault> finish() {
-        ReceivedRequest& received = parser->received;
-        received.keep_alive = parser->keep_alive();
-        received.wants_websocket = received.wants_websocket && parser->upgrade();
-        if (!parser->path_is_good) {
+    tl::expected<ReceivedRequest*, HttpFault> finish(RequestParser& done) {
+        ReceivedRequest& received = done.received;
+        received.keep_alive = done.keep_alive();
+        received.wants_websocket = received.wants_websocket && done.upgrade();
+        if (!done.path_is_good) {
             return refuse({.status = 400, .detail = "the path holds a broken percent sign"});
         }
-        if (!received.is_http_1_0 && !parser->has_host) {
+        if (!received.is_http_1_0 && !done.has_host) {
             return refuse({.status = 400, .detail = "HTTP/1.1 requests have a Host header"});
         }
-        if (parser->lengths > 1) {  // two lengths have let requests be smuggled in
+        if (done.lengths > 1) {  // two lengths have let requests be smuggled in
             return refuse({.status = 400, .detail = "the body's length is given twice"});
         }
         is_given = true;
@@ -199,15 +199,15 @@ struct HttpReader::Impl {
                     ++used;
                     continue;
                 }
-                parser.emplace();
             }
+            RequestParser& reading = parser ? *parser : parser.emplace();
             error_code error;
-            used += parser->put(boost::asio::const_buffer(rest.data(), rest.size()), error);
+            used += reading.put(boost::asio::const_buffer(rest.data(), rest.size()), error);
             if (error && error != http::error::need_more) {
                 return refuse(fault_of(error));
             }
-            if (parser->is_done()) {
-                return finish();
+            if (reading.is_done()) {
+                return finish(reading);
             }
             if (error == http::error::need_more) {
                 if (buffer.size() - used > kHttpHeaderBytesMax) {
@@ -242,7 +242,8 @@ bool HttpReader::is_inside_request() const {
 }
 
 bool HttpReader::is_inside_body() const {
-    return impl_->parser && !impl_->is_given && impl_->parser->is_header_done();
+    const std::optional<RequestParser>& parser = impl_->parser;
+    return parser && !impl_->is_given && parser->is_header_done();
 }
 
 Bytes HttpReader::take_rest() {

@@ -1,6 +1,7 @@
 #include "server/net/http_session.h"
 
 #include "protocol/base/bytes.h"
+#include "protocol/base/check.h"
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
 #include "server/http/http_message.h"
@@ -200,16 +201,16 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     received.request.session = origin_.id;
     received.request.flow = flow_;
     received.request.stop = stop_.get_token();
-    asked_ = {.id = received.request.id,
-              .keep_alive = received.keep_alive && !draining_,
-              .is_http_1_0 = received.is_http_1_0,
-              .is_head = received.request.method == "HEAD",
-              .since = now,
-              .method = {},
-              .path = {}};
+    Asked& asked = asked_.emplace(Asked{.id = received.request.id,
+                                        .keep_alive = received.keep_alive && !draining_,
+                                        .is_http_1_0 = received.is_http_1_0,
+                                        .is_head = received.request.method == "HEAD",
+                                        .since = now,
+                                        .method = {},
+                                        .path = {}});
     if (context_.requests_log != nullptr) {
-        asked_->method = received.request.method;
-        asked_->path = received.request.path;
+        asked.method = received.request.method;
+        asked.path = received.request.path;
     }
     keep_to_rates_of(received.request);
     request_rate_.refill(now);
@@ -223,7 +224,7 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
     }
     if (received.request.path == context_.websocket.path && context_.websocket.make) {
         if (upgrades(received)) {
-            log_answer(101, 0);
+            log_answer(asked, 101, 0);
             asked_.reset();
             upgrade_ = std::move(received);
             return;
@@ -234,7 +235,8 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
         answer(std::move(refusal));
         return;
     }
-    if (auto response = context_.router->handle(received.request, [this] { return later(); })) {
+    const auto later_to_this = [this, id = received.request.id] { return later(id); };
+    if (auto response = context_.router->handle(received.request, later_to_this)) {
         answer(*std::move(response));
     } else if (input_ended_) {
         probe();
@@ -243,14 +245,14 @@ void HttpSession::dispatch(ReceivedRequest& received, Clock::time_point now) {
 
 /// Finds out whether a client that sends no more still wants its answer. HTTP/1.0 knows no 1xx.
 void HttpSession::probe() {
-    if (!asked_->is_http_1_0) {
+    if (asked_ && !asked_->is_http_1_0) {
         outbox_.push(probe_bytes(), nullptr);
     }
 }
 
-/// The way by which the answer to the present request comes from another thread, or later.
-HttpRespond HttpSession::later() {
-    return [weak = weak_from_this(), post = post_, id = asked_->id](HttpResponse response) {
+/// The way by which the answer to a request comes from another thread, or later.
+HttpRespond HttpSession::later(std::uint64_t id) {
+    return [weak = weak_from_this(), post = post_, id](HttpResponse response) {
         post([weak, id, response = std::move(response)]() mutable {
             const auto session = weak.lock();
             if (session && session->asked_ && session->asked_->id == id) {
@@ -270,8 +272,7 @@ void HttpSession::keep_to_rates_of(const HttpRequest& request) {
         return;
     }
     const bool is_first = !token_;
-    token_ = std::move(token);
-    rates_ = context_.rates_of(*token_);
+    rates_ = context_.rates_of(token_.emplace(std::move(token)));
     const double requests = rates_.requests_per_second_max;
     const auto bytes = static_cast<double>(rates_.bytes_per_second_max);
     if (is_first) {  // full; but who shows one token after another has one bucket
@@ -299,39 +300,40 @@ bool HttpSession::upgrades(const ReceivedRequest& received) {
 }
 
 void HttpSession::answer(HttpResponse response) {
+    const std::optional<Asked> asked = std::exchange(asked_, std::nullopt);
+    TERRANE_ASSERT(asked.has_value());
     HttpCounters& counters = *context_.counters;
     counters.by_class.at(std::min(response.status / 100, 5U))
         .fetch_add(1, std::memory_order_relaxed);
     if (response.status == 304) {
         counters.not_modified.fetch_add(1, std::memory_order_relaxed);
     }
-    const bool keep_alive = asked_->keep_alive;
-    if (asked_->is_http_1_0 && keep_alive) {
+    const bool keep_alive = asked->keep_alive;
+    if (asked->is_http_1_0 && keep_alive) {
         response.headers.emplace_back("Connection", "keep-alive");
     }
-    const bool has_body = !asked_->is_head && response.status != 304;
+    const bool has_body = !asked->is_head && response.status != 304;
     const std::size_t before_bytes = outbox_.bytes();
     outbox_.push(
-        http_head(response, asked_->id, keep_alive, http_date(std::chrono::system_clock::now())),
+        http_head(response, asked->id, keep_alive, http_date(std::chrono::system_clock::now())),
         has_body ? response.body : nullptr);
     byte_rate_.take(static_cast<double>(outbox_.bytes() - before_bytes));
-    log_answer(response.status, response.body ? response.body->size() : 0);
-    asked_.reset();
+    log_answer(*asked, response.status, response.body ? response.body->size() : 0);
     if (!keep_alive) {
         close_with({});
     }
 }
 
-void HttpSession::log_answer(unsigned status, std::size_t body_bytes) const {
+void HttpSession::log_answer(const Asked& asked, unsigned status, std::size_t body_bytes) const {
     if (context_.requests_log == nullptr) {
         return;
     }
     const auto took =
-        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked_->since);
-    context_.requests_log->debug("http", {{"request", asked_->id},
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - asked.since);
+    context_.requests_log->debug("http", {{"request", asked.id},
                                           {"session", origin_.id},
-                                          {"method", asked_->method},
-                                          {"path", asked_->path},
+                                          {"method", asked.method},
+                                          {"path", asked.path},
                                           {"status", std::uint64_t{status}},
                                           {"bytes", std::uint64_t{body_bytes}},
                                           {"us", std::int64_t{took.count()}}});
@@ -446,11 +448,14 @@ std::string HttpSession::close_reason() const {
 }
 
 std::shared_ptr<ByteProtocol> HttpSession::take_successor() {
-    if (!upgrade_ || !outbox_.empty()) {
+    if (!outbox_.empty()) {
         return nullptr;
     }
-    const ReceivedRequest request = *std::exchange(upgrade_, std::nullopt);
-    return context_.websocket.make(request, reader_.take_rest(), post_, Clock::now());
+    const std::optional<ReceivedRequest> request = std::exchange(upgrade_, std::nullopt);
+    if (!request) {
+        return nullptr;
+    }
+    return context_.websocket.make(*request, reader_.take_rest(), post_, Clock::now());
 }
 
 ProtocolFactory http_protocol(const HttpContext& context) {

@@ -125,10 +125,10 @@ class HttpSession final : public ByteProtocol, public std::enable_shared_from_th
     void dispatch(ReceivedRequest& received, Clock::time_point now);
     void keep_to_rates_of(const HttpRequest& request);
     bool takes_request();
-    HttpRespond later();
+    HttpRespond later(std::uint64_t id);
     void probe();
     void answer(HttpResponse response);
-    void log_answer(unsigned status, std::size_t body_bytes) const;
+    void log_answer(const Asked& asked, unsigned status, std::size_t body_bytes) const;
     void refuse(const HttpFault& fault);
     void close_with(std::string reason);
     bool upgrades(const ReceivedRequest& received);

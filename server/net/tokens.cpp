@@ -57,8 +57,9 @@ std::optional<Sha256> sha256_from_hex(std::string_view text) {
 std::chrono::sys_seconds seconds_of(const toml::date_time& at) {
     using namespace std::chrono;
     const sys_days day = year(at.date.year) / month(at.date.month) / std::chrono::day(at.date.day);
+    const int offset_minutes = at.offset ? at.offset->minutes : 0;  // a table gives none without
     return day + hours(at.time.hour) + minutes(at.time.minute) + seconds(at.time.second) -
-           minutes(at.offset->minutes);
+           minutes(offset_minutes);
 }
 
 template <typename T>

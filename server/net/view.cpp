@@ -84,6 +84,7 @@ ViewSquares::ViewSquares(const ViewUpdate& update, const ViewWorld& world,
     const std::size_t levels = std::min(
         {update.radius_chunks.size(), kViewLevelsMax, static_cast<std::size_t>(world.levels)});
     std::vector<double> radii;
+    radii.reserve(levels);
     for (std::size_t i = 0; i < levels; ++i) {
         radii.push_back(std::min(update.radius_chunks[i], bounds.radius_max));
     }

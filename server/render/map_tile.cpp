@@ -100,11 +100,14 @@ void draw_rivers(Relief& relief, const Patch& patch, RiverMap& rivers, const Col
     const RectangleShape shape{
         .x0 = first.x, .z0 = first.z, .width = patch.width, .length = patch.length, .step = step};
     const std::span<const float> distances = rivers.distances(shape, half_pixel);
+    const auto stride = static_cast<std::size_t>(shape.stride());
+    const auto width = static_cast<std::size_t>(patch.width);
     for (std::int32_t z = 0; z < patch.length; ++z) {
+        const auto row = static_cast<std::size_t>(z);
         for (std::int32_t x = 0; x < patch.width; ++x) {
-            const bool is_near =
-                distances[static_cast<std::size_t>(z * shape.stride() + x)] < half_pixel;
-            if (is_near && wet[static_cast<std::size_t>(z * patch.width + x)] == 0) {
+            const auto column = static_cast<std::size_t>(x);
+            const bool is_near = distances[row * stride + column] < half_pixel;
+            if (is_near && wet[row * width + column] == 0) {
                 LinearColor& color = relief.colors[relief.index_of(patch.x + x, patch.y + z)];
                 color = under_water(color, water, kRiverDepth);
             }

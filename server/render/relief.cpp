@@ -35,8 +35,10 @@ constexpr std::array<std::int32_t, 2> kHollowSizes = {3, 11};
 /// 2^(lod / 2) would keep fractal terrain as rough at all scales.
 float exaggeration_of(const Relief& relief) {
     float times = 1.35F;
-    for (float step = relief.step_voxels; step > 1.5F; step /= 2) {
+    float step = relief.step_voxels;
+    while (step > 1.5F) {
         times *= 1.32F;
+        step /= 2;
     }
     return times;
 }

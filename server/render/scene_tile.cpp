@@ -268,8 +268,7 @@ void fill_highest(SceneTile& tile) {
                     highest = std::max(highest, tile.covers[SceneTile::index_of(u + j, v + i)]);
                 }
             }
-            tile.block_highest[static_cast<std::size_t>(v / kBlockCells * kBlocksPerSide +
-                                                        u / kBlockCells)] = highest;
+            tile.block_highest[SceneTile::block_of(u, v)] = highest;
             tile.highest = std::max(tile.highest, highest);
         }
     }
@@ -427,8 +426,8 @@ bool in_water(const SceneTile& tile, TilePoint point) {
     if (tile.waters.empty()) {
         return false;
     }
-    const auto u = std::clamp(static_cast<std::int32_t>(point.u + 0.5), 0, kTileCells);
-    const auto v = std::clamp(static_cast<std::int32_t>(point.v + 0.5), 0, kTileCells);
+    const auto u = std::clamp(static_cast<std::int32_t>(std::floor(point.u + 0.5)), 0, kTileCells);
+    const auto v = std::clamp(static_cast<std::int32_t>(std::floor(point.v + 0.5)), 0, kTileCells);
     for (const WaterInterval& water : waters_of(tile, SceneTile::index_of(u, v))) {
         if (point.y > static_cast<double>(water.bed) &&
             point.y < static_cast<double>(water.surface)) {

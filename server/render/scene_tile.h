@@ -47,7 +47,7 @@ struct TilePoint {
 struct SceneTile {
     std::int32_t lod = 0;
     float highest = kNoHeight;
-    std::array<float, kBlocksPerSide * kBlocksPerSide> block_highest{};
+    std::array<float, std::size_t{kBlocksPerSide} * kBlocksPerSide> block_highest{};
     /// Each column's highest point that is not void: solid or, where nothing covers it, a cave's
     /// lid.
     std::vector<float> covers;
@@ -68,6 +68,12 @@ struct SceneTile {
 
     static constexpr std::size_t index_of(std::int32_t u, std::int32_t v) {
         return static_cast<std::size_t>(v) * (kTileCells + 1) + static_cast<std::size_t>(u);
+    }
+
+    /// Of the block that has the cell (u, v).
+    static constexpr std::size_t block_of(std::int32_t u, std::int32_t v) {
+        return static_cast<std::size_t>(v / kBlockCells) * kBlocksPerSide +
+               static_cast<std::size_t>(u / kBlockCells);
     }
 };
 

@@ -153,8 +153,7 @@ Found advance(SceneReader& reader, const Ray& ray, double& t, double end, Sight 
         end, exit_of(ray, placed.x0 + placed.step * block_u * kBlockCells,
                      placed.z0 + placed.step * block_v * kBlockCells, placed.step * kBlockCells));
     if (lowest(ray, t, exit) >
-        static_cast<double>(placed.tile->block_highest[static_cast<std::size_t>(
-            block_v * kBlocksPerSide + block_u)])) {
+        static_cast<double>(placed.tile->block_highest[SceneTile::block_of(cell_u, cell_v)])) {
         t = std::max(exit, t) + kNudge;
         return {};
     }

@@ -91,7 +91,7 @@ Result<Square> square_of(const World& world, std::int32_t region_columns) {
     const std::int32_t side = world.definition.grid.side;
     const std::int32_t stacks = std::max(1, region_columns / side);
     Square square;
-    square.width = static_cast<std::size_t>(stacks * side);
+    square.width = static_cast<std::size_t>(stacks) * static_cast<std::size_t>(side);
     square.solid.resize(square.width * square.width);
     square.water256.resize(square.solid.size());
     StackGenerator generator(world);

@@ -63,8 +63,8 @@ std::vector<double> ticks_of(const Axis& axis) {
     std::vector<double> ticks;
     if (axis.logarithmic) {
         const bool few = axis.most / axis.least < 300;
-        for (double power = std::pow(10, std::floor(std::log10(axis.least)));
-             power <= axis.most * 1.0001; power *= 10) {
+        double power = std::pow(10, std::floor(std::log10(axis.least)));
+        while (power <= axis.most * 1.0001) {
             for (const double factor : {1.0, 2.0, 5.0}) {
                 const double tick = power * factor;
                 if ((few || factor == 1.0) && tick >= axis.least * 0.9999 &&
@@ -72,6 +72,7 @@ std::vector<double> ticks_of(const Axis& axis) {
                     ticks.push_back(tick);
                 }
             }
+            power *= 10;
         }
         return ticks;
     }

@@ -206,6 +206,10 @@ CaveNumbers explore(const Region& region) {
 /// Columns to walk to the nearest one with a vein, by two passes of steps of 1 and sqrt 2.
 std::vector<double> walks(const Region& region) {
     const std::int32_t side = region.side;
+    const auto index_of = [&](std::int32_t x, std::int32_t z) {
+        return static_cast<std::size_t>(z) * static_cast<std::size_t>(side) +
+               static_cast<std::size_t>(x);
+    };
     std::vector<double> away(region.has_vein.size());
     std::ranges::transform(region.has_vein, away.begin(),
                            [](std::uint8_t has) { return has != 0 ? 0.0 : 1e9; });
@@ -214,13 +218,12 @@ std::vector<double> walks(const Region& region) {
             for (std::int32_t j = 0; j < side; ++j) {
                 const std::int32_t z = sign > 0 ? i : side - 1 - i;
                 const std::int32_t x = sign > 0 ? j : side - 1 - j;
-                double& here = away[static_cast<std::size_t>(z * side + x)];
+                double& here = away[index_of(x, z)];
                 const auto step = [&](std::int32_t dx, std::int32_t dz, double length) {
                     const std::int32_t u = x + dx * sign;
                     const std::int32_t v = z + dz * sign;
                     if (u >= 0 && v >= 0 && u < side && v < side) {
-                        here =
-                            std::min(here, away[static_cast<std::size_t>(v * side + u)] + length);
+                        here = std::min(here, away[index_of(u, v)] + length);
                     }
                 };
                 step(-1, 0, 1);

@@ -108,6 +108,7 @@ Result<void> measure_terrain(Samples& samples, const WorldDefinition& definition
 Result<SpeedTable> measure_speed(const ReportOptions& options) {
     std::array<Samples, kNames.size()> samples;
     std::vector<WorldDefinition> definitions;
+    definitions.reserve(kNames.size());
     for (const char* name : kNames) {
         definitions.push_back(shipped_definition(std::string("paper-") + name));
     }

@@ -261,5 +261,13 @@ TEST_F(LoadClientTest, AnswersPingsAndAsksForTheWorldOnce) {
     EXPECT_EQ(std::get<Pong>(said(client).at(0)).nonce, 5U);
 }
 
+TEST_F(LoadClientTest, RefusesAWorldBeforeTheGreeting) {
+    LoadClient client = make(options(true));
+    const auto told = tell(client, WorldAnswer{.request_id = 1, .toml = "x", .fingerprint = {}});
+    ASSERT_FALSE(told);
+    EXPECT_EQ(told.error().code, ErrorCode::malformed);
+    EXPECT_EQ(worlds_, 0);
+}
+
 }  // namespace
 }  // namespace terrane
