@@ -81,8 +81,8 @@ std::optional<HttpResponse> answer_file(ChunkService& service, const WorkKey& ke
 }
 
 /// A document that is made anew for each request: it takes microseconds.
-HttpHandler document(TilesetShape shape, std::string_view content_type,
-                     Result<Bytes> (*make)(const TilesetShape&, const TileIndex&)) {
+auto document(TilesetShape shape, std::string_view content_type,
+              Result<Bytes> (*make)(const TilesetShape&, const TileIndex&)) {
     return [shape, content_type, make](const HttpRequest&, const RouteParams& params,
                                        const HttpLater&) {
         const auto tile = tile_of(shape, params);

@@ -1,5 +1,6 @@
 #include "server/net/session.h"
 
+#include "protocol/base/bytes.h"
 #include "protocol/base/coords.h"
 #include "protocol/base/result.h"
 #include "protocol/wire/frame.h"
@@ -9,9 +10,7 @@
 #include "server/net/session_caps.h"
 #include "server/net/token_bucket.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>

@@ -1,7 +1,6 @@
 // The requests' part of a session: what is asked becomes wishes, wishes go to the service while
 // there is room for their answers, and what comes back goes to the client.
 #include "generator/world/composition.h"
-#include "protocol/base/coords.h"
 #include "protocol/base/hash.h"
 #include "protocol/base/result.h"
 #include "protocol/wire/messages.h"
