@@ -268,7 +268,7 @@ void fill_highest(SceneTile& tile) {
                     highest = std::max(highest, tile.covers[SceneTile::index_of(u + j, v + i)]);
                 }
             }
-            tile.block_highest[SceneTile::block_of(u, v)] = highest;
+            tile.block_highest[SceneTile::block_index(u / kBlockCells, v / kBlockCells)] = highest;
             tile.highest = std::max(tile.highest, highest);
         }
     }

@@ -70,10 +70,9 @@ struct SceneTile {
         return static_cast<std::size_t>(v) * (kTileCells + 1) + static_cast<std::size_t>(u);
     }
 
-    /// Of the block that has the cell (u, v).
-    static constexpr std::size_t block_of(std::int32_t u, std::int32_t v) {
-        return static_cast<std::size_t>(v / kBlockCells) * kBlocksPerSide +
-               static_cast<std::size_t>(u / kBlockCells);
+    /// Of block (u, v) in `block_highest`.
+    static constexpr std::size_t block_index(std::int32_t u, std::int32_t v) {
+        return static_cast<std::size_t>(v) * kBlocksPerSide + static_cast<std::size_t>(u);
     }
 };
 

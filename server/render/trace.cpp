@@ -153,7 +153,7 @@ Found advance(SceneReader& reader, const Ray& ray, double& t, double end, Sight 
         end, exit_of(ray, placed.x0 + placed.step * block_u * kBlockCells,
                      placed.z0 + placed.step * block_v * kBlockCells, placed.step * kBlockCells));
     if (lowest(ray, t, exit) >
-        static_cast<double>(placed.tile->block_highest[SceneTile::block_of(cell_u, cell_v)])) {
+        static_cast<double>(placed.tile->block_highest[SceneTile::block_index(block_u, block_v)])) {
         t = std::max(exit, t) + kNudge;
         return {};
     }
@@ -225,8 +225,8 @@ double clear_way(SceneReader& reader, const Ray& ray, double t, double margin) {
     };
     const std::int32_t u = number(at.x - placed.x0);
     const std::int32_t v = number(at.z - placed.z0);
-    const auto index = static_cast<std::size_t>(v * kBlocksPerSide + u);
-    if (at.y - margin <= static_cast<double>(placed.tile->block_highest[index])) {
+    if (at.y - margin <=
+        static_cast<double>(placed.tile->block_highest[SceneTile::block_index(u, v)])) {
         return 0;
     }
     return std::max(0.0, exit_of(ray, placed.x0 + block * u, placed.z0 + block * v, block) - t) +
