@@ -64,7 +64,8 @@ double sun_over_land(SceneReader& reader, glm::dvec3 from, glm::dvec3 to_sun, do
         }
         const double half_shadow = kPenumbra * t + 0.05 * step;
         if (const double clear =
-                clear_way(reader, {.origin = from, .direction = to_sun}, t, half_shadow)) {
+                clear_way(reader, {.origin = from, .direction = to_sun}, t, half_shadow);
+            clear != 0) {
             t += clear;
             continue;
         }

@@ -1,5 +1,6 @@
 #include "server/render/scene.h"
 
+#include "generator/landscape/river_map.h"
 #include "generator/terrain/generate_stack.h"
 #include "generator/terrain/world.h"
 #include "generator/volume/color.h"
@@ -71,12 +72,12 @@ Scene::Scene(const World& world, ColumnPos origin, std::optional<ColumnBlock> bl
 
 void Scene::add_level(std::int64_t x_first, std::int64_t z_first, std::int64_t width,
                       std::int64_t length) {
-    levels_.push_back(
-        {.x_first = x_first,
-         .z_first = z_first,
-         .width = width,
-         .length = length,
-         .slots = std::make_unique<Slot[]>(static_cast<std::size_t>(width * length))});
+    levels_.push_back({.x_first = x_first,
+                       .z_first = z_first,
+                       .width = width,
+                       .length = length,
+                       .slots = std::make_unique<Slot[]>(static_cast<std::size_t>(width) *
+                                                         static_cast<std::size_t>(length))});
 }
 
 PlacedTile Scene::tile_at(double x, double z, StackGenerator& generator, RiverMap& rivers) const {

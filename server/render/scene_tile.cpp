@@ -286,10 +286,12 @@ void color_rivers(SceneTile& tile, RiverMap& rivers, ColumnPos first) {
                                .length = kTileCells + 1,
                                .step = step};
     const std::span<const float> distances = rivers.distances(shape, half);
+    const auto stride = static_cast<std::size_t>(shape.stride());
     for (std::int32_t v = 0; v <= kTileCells; ++v) {
         for (std::int32_t u = 0; u <= kTileCells; ++u) {
             const std::size_t i = SceneTile::index_of(u, v);
-            if (distances[static_cast<std::size_t>(v * shape.stride() + u)] < half &&
+            if (distances[static_cast<std::size_t>(v) * stride + static_cast<std::size_t>(u)] <
+                    half &&
                 waters_of(tile, i).empty()) {
                 tile.top_colors[i] = kFarWater;
             }
