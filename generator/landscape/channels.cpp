@@ -93,21 +93,6 @@ float channel_height(const NearReach& near, float ground) {
            (ground - near.level + 1.0F) * smooth_step(0, 1, (d - w) / (out_of(w) - w));
 }
 
-/// Where the land lies lower than a river beside it, it slopes up to the river's banks. Each reach
-/// looks at the land as it was; what is raised in the bed of another one is cut again.
-void raise_low_ground(float* ground, ChannelRasters& out) {
-    out.raised.clear();
-    for (const NearReach& near : out.near) {
-        const float bank = near.level - 1.0F;
-        if (near.distance >= near.half_width && ground[near.column] < bank) {
-            out.raised.push_back({near.column, channel_height(near, ground[near.column])});
-        }
-    }
-    for (const auto& [column, height] : out.raised) {
-        ground[column] = std::max(ground[column], height);
-    }
-}
-
 }  // namespace
 
 void find_near(std::vector<NearReach>& found, const ChannelConstants& constants,
@@ -197,7 +182,6 @@ void cut_channels(float* ground, ChannelRasters& out, const ChannelConstants& co
                 out.weight[i] += weight;
             }
         }
-        raise_low_ground(ground, out);
         for (const NearReach& near : out.near) {
             const std::size_t i = near.column;
             ground[i] = std::min(ground[i], channel_height(near, ground[i]));

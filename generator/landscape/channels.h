@@ -3,7 +3,7 @@
 //     w = .15 + rivers * measure (half the width), d the distance, h the level, out = 5 w + 2
 //     d < w:  h - 1 - min(.8 + .5 w, w) (1 - d^2/w^2)            the bed
 //     else:   h - 1 + (ground - h + 1) step(0, 1, (d - w)/(out - w))
-//     taken if lower; where the ground lies lower than h - 1 it is raised to it, outside of beds
+//     taken if lower: channels only cut, and where two are near, each cuts what the other left
 //     water up to h - 1.4 where d < 1.3 w
 //
 // Reaches thinner than kDryWidth are dry. A sink that is not under the sea holds a lake. Levels
@@ -39,11 +39,6 @@ struct NearReach {
     float level = 0;
 };
 
-struct RaisedColumn {
-    std::size_t column = 0;
-    float height = 0;
-};
-
 /// Per column of a shape.
 struct ChannelRasters {
     std::vector<float> water;     ///< level, or kNoWater
@@ -51,8 +46,7 @@ struct ChannelRasters {
     std::vector<float> nearness;  ///< distance to the nearest channel's middle in its half widths
     std::vector<float> weight;    ///< of the levels that `water` is made of
     std::vector<NearReach> near;  ///< scratch: reach by reach
-    std::vector<RaisedColumn> raised;  ///< scratch
-    bool is_wet = false;               ///< water stands somewhere
+    bool is_wet = false;          ///< water stands somewhere
 };
 
 /// Each column to which each reach that has water somewhere is near enough to shape its banks, or

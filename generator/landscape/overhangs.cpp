@@ -24,9 +24,10 @@ namespace {
 
 constexpr float kHard = 1.3F;
 constexpr float kSoft = 0.9F;
-constexpr float kThickLeast = 4;    ///< voxels
-constexpr float kGapLeast = 1.25F;  ///< voxels
-constexpr float kCutMost = 0.5F;    ///< voxels
+constexpr float kThickLeast = 4;      ///< voxels
+constexpr float kGapLeast = 1.25F;    ///< voxels
+constexpr float kCrestLeast = 0.27F;  ///< lower down, the land goes over from the rock's shape
+constexpr float kCutMost = 0.5F;      ///< voxels
 constexpr float kNothing = -1e9F;
 
 /// to[i] = the greatest of from[i], from[i + stride], ... from[i + 2 * reach * stride]: windows of
@@ -142,10 +143,12 @@ bool OverhangField::find_ledges(const OverhangConstants& constants,
                                           .highest = highest_.data() + center + 1,
                                           .raw = input.raw + center + 1,
                                           .moved = input.moved + center + 1,
+                                          .crest = input.crest + center + 1,
                                           .raw_top = raw_top_.data() + first + 1,
                                           .top = top + first + 1,
                                           .bottom = top - plane + first + 1,
                                           .bit = std::uint32_t{1} << l,
+                                          .crest_least = kCrestLeast,
                                           .thick_least = kThickLeast,
                                           .count = shape.width - 2});
             any_here |= seen.leans;
@@ -176,7 +179,7 @@ void OverhangField::build(const OverhangConstants& constants, const ResistanceCo
     over_.resize(size);
     for (std::size_t i = 0; i < size; ++i) {
         // A column that can be no lip is as if it had no rock.
-        const bool is_lip = (static_cast<int>(input.crest[i] >= 0.27F) &
+        const bool is_lip = (static_cast<int>(input.crest[i] >= kCrestLeast) &
                              static_cast<int>(input.fine[i] >= -1.0F)) != 0;
         const float over = input.raw[i] - input.moved[i];
         over_[i] = is_lip ? over : kNothing;

@@ -66,7 +66,7 @@ double sun_over_land(SceneReader& reader, glm::dvec3 from, glm::dvec3 to_sun, do
         if (const double clear =
                 clear_way(reader, {.origin = from, .direction = to_sun}, t, half_shadow);
             clear != 0) {
-            t += clear;
+            t += std::max(clear, 0.01 * step);
             continue;
         }
         const double above = at.y - reader.top_at(at.x, at.z);
@@ -89,7 +89,7 @@ double sun_seen(SceneReader& reader, const Light& light, const Hit& hit, double 
         return sun_over_land(reader, from, light.to_sun, step);
     }
     // Walls are uneven by a column, being made of columns: that casts no shadow.
-    const glm::dvec3 before = hit.point + hit.normal * (1.5 * step);
+    const glm::dvec3 before = hit.point + hit.normal * (1.5 * std::min(step, 2.0));
     const glm::dvec3 origin = hit.cut || reader.density_at(before) > 0 ? from : before;
     return trace(reader, {.origin = origin, .direction = light.to_sun}, kShadowSight) ? 0 : 1;
 }

@@ -274,7 +274,7 @@ void fill_highest(SceneTile& tile) {
     }
 }
 
-/// Rivers narrower than a cell would be dashes.
+/// Rivers narrower than a cell would be dashes: what is within half a cell of a river is coloured.
 void color_rivers(SceneTile& tile, RiverMap& rivers, ColumnPos first) {
     // What water reflects and what it is, seen from far and aslant.
     constexpr LinearColor kFarWater = {.r = 0.12F, .g = 0.21F, .b = 0.30F};

@@ -77,7 +77,7 @@ struct SceneTile {
 };
 
 /// Makes the tile whose column (0, 0) is `first`. A tile beyond the world's edge is empty:
-/// kNoHeight everywhere. Above level 0, rivers narrower than a cell are coloured as wide as one.
+/// kNoHeight everywhere. Above level 0, the land within half a cell of a river has its colour.
 SceneTile make_scene_tile(const World& world, StackGenerator& generator, RiverMap& rivers,
                           ColumnPos first, std::int32_t lod);
 

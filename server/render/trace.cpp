@@ -195,14 +195,17 @@ glm::dvec3 fall_at(SceneReader& reader, glm::dvec3 point, double step) {
 
 glm::dvec3 normal_at(SceneReader& reader, glm::dvec3 point) {
     const double step = reader.tile_at(point.x, point.z).step;
-    glm::dvec3 normal = fall_at(reader, point, step);
+    const glm::dvec3 here = fall_at(reader, point, step);
+    glm::dvec3 normal = here;
     // The columns of a wall stand in steps, and the nearest two show an axis or the diagonal: what
-    // way it faces is seen over some more of them.
+    // way it faces is seen over some more of them, but for those that see its other side.
     constexpr double kSteep = 0.35;  // of a unit normal's upright part
-    if (std::abs(normal.y) < kSteep * glm::length(normal)) {
+    if (std::abs(here.y) < kSteep * glm::length(here)) {
         for (const double x : {-2.0, 0.0, 2.0}) {
             for (const double z : {-2.0, 0.0, 2.0}) {
-                normal += fall_at(reader, point + glm::dvec3(x * step, 0, z * step), step);
+                const glm::dvec3 beside =
+                    fall_at(reader, point + glm::dvec3(x * step, 0, z * step), step);
+                normal += glm::dot(beside, here) > 0 ? beside : glm::dvec3(0);
             }
         }
     }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,54 @@ TEST_P(LandscapeWater, NowhereStandsThreeQuartersOfAVoxelAboveANeighbour) {
     }
     EXPECT_GT(wet, 500);
     EXPECT_EQ(walls, 0) << "the last at " << where;
+}
+
+/// How many neighbours of dry columns near water lie over a voxel lower than these, which stand no
+/// higher than a bank.
+TEST(LandscapeBanks, AreNoWallsInFrontOfLowGround) {
+    constexpr std::int32_t kWidth = 256;
+    constexpr std::int32_t kNear = 8;
+    const auto world = load_shipped_world("canyon");
+    ASSERT_NE(world, nullptr);
+    std::vector<std::int32_t> water(std::size_t{kWidth} * kWidth);
+    std::vector<std::int32_t> top(water.size());
+    // Six arms meet here, over ground that lies lower than they do.
+    for_each_column(
+        *world, -720, 220, kWidth, 64,
+        [&](std::int32_t x, std::int32_t z, std::span<const Limit> column, const Palette& palette) {
+            const auto i = static_cast<std::size_t>(z * kWidth + x);
+            water[i] = open_water256(column, palette, world->definition.materials);
+            top[i] = solid_intervals(column, palette).back().high;
+        });
+    const auto level_near = [&](std::int32_t x, std::int32_t z) {
+        std::int32_t level = INT32_MIN;
+        for (std::int32_t dz = -kNear; dz <= kNear; ++dz) {
+            for (std::int32_t dx = -kNear; dx <= kNear; ++dx) {
+                level =
+                    std::max(level, water[static_cast<std::size_t>((z + dz) * kWidth + x + dx)]);
+            }
+        }
+        return level;
+    };
+    int banks = 0;
+    int walls = 0;
+    for (std::int32_t z = kNear; z < kWidth - kNear; ++z) {
+        for (std::int32_t x = kNear; x < kWidth - kNear; ++x) {
+            const auto i = static_cast<std::size_t>(z * kWidth + x);
+            const std::int32_t level = level_near(x, z);
+            if (water[i] != INT32_MIN || level == INT32_MIN ||
+                top[i] > level + 2 * kUnitsPerVoxel) {
+                continue;
+            }
+            ++banks;
+            for (const std::size_t beside : {i - 1, i + 1, i - kWidth, i + kWidth}) {
+                walls += water[beside] == INT32_MIN && top[i] - top[beside] > kUnitsPerVoxel;
+            }
+        }
+    }
+    std::printf("%d columns of banks, %d walls\n", banks, walls);
+    EXPECT_GT(banks, 3000);
+    EXPECT_EQ(walls, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, LandscapeWater,

@@ -250,10 +250,12 @@ LedgeSeen ledge(const LedgeRow& row) {
     const float* __restrict const highest = row.highest;
     const float* __restrict const raw = row.raw;
     const float* __restrict const moved = row.moved;
+    const float* __restrict const crest = row.crest;
     const float* __restrict const raw_top = row.raw_top;
     const float* __restrict const top = row.top;
     const float* __restrict const bottom = row.bottom;
     const std::uint32_t bit = row.bit;
+    const float crest_least = row.crest_least;
     const float thick_least = row.thick_least;
     const std::int32_t count = row.count;
     std::uint32_t any_leans = 0;
@@ -262,7 +264,8 @@ LedgeSeen ledge(const LedgeRow& row) {
         const std::uint32_t is_lower = raw_top[i] <= highest[i] ? bit : 0;
         const std::uint32_t is_above = raw_top[i] > raw[i] - moved[i] ? bit : 0;
         const std::uint32_t is_thick = top[i] - bottom[i] > thick_least ? bit : 0;
-        const std::uint32_t leans = is_lower & is_above & is_thick;
+        const std::uint32_t is_high = crest[i] >= crest_least ? bit : 0;
+        const std::uint32_t leans = is_lower & is_above & is_thick & is_high;
         lean[i] |= leans;
         any_leans |= leans;
         any_lower |= is_lower;

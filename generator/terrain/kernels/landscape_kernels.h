@@ -145,10 +145,12 @@ struct LedgeRow {
     const float* highest = nullptr;
     const float* raw = nullptr;
     const float* moved = nullptr;
+    const float* crest = nullptr;
     const float* raw_top = nullptr;
     const float* top = nullptr;
     const float* bottom = nullptr;
     std::uint32_t bit = 0;
+    float crest_least = 0;
     float thick_least = 0;
     std::int32_t count = 0;
 };
