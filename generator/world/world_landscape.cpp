@@ -58,7 +58,7 @@ void read_structure(OptionalKeys keys, StructureParameters& structure) {
     keys.table().finish();
 }
 
-void read_relief(OptionalKeys keys, ReliefParameters& relief) {
+void read_relief(OptionalKeys keys, double depth, ReliefParameters& relief) {
     keys.number("height", {.least = 0, .most = kReliefHeightMax}, relief.height);
     keys.number("ground", kLengths, relief.ground);
     keys.number("fall", kLengths, relief.fall);
@@ -76,6 +76,12 @@ void read_relief(OptionalKeys keys, ReliefParameters& relief) {
     keys.level("sea_level", relief.sea_level);
     keys.level("snow_line", relief.snow_line);
     keys.number("soil", {.least = 0, .most = kSoilMax}, relief.soil);
+    if (relief.height > 0 && depth > 0 && relief.ground + relief.fall > depth) {
+        keys.table().fault("ground", "and fall bring rivers to height " +
+                                         number_text(relief.ground + relief.fall) +
+                                         "; they must run in the layers, whose depth is " +
+                                         number_text(depth));
+    }
     keys.table().finish();
 }
 
@@ -117,7 +123,7 @@ void read_landscape(const LandscapeTables& tables, WorldFaults& faults, WorldDef
         read_structure({*tables.structure, "structure", faults}, world.structure);
     }
     if (tables.relief != nullptr) {
-        read_relief({*tables.relief, "relief", faults}, world.relief);
+        read_relief({*tables.relief, "relief", faults}, world.terrain.depth, world.relief);
     }
     if (tables.caves != nullptr) {
         read_caves({*tables.caves, "caves", faults}, world.caves);

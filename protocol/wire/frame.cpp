@@ -58,6 +58,11 @@ Result<std::optional<Frame>> FrameReader::read_frame() {
         return std::nullopt;
     }
     const std::size_t length = length_at(rest);
+    constexpr std::size_t kHttp = 0x50545448;  // "HTTP" as a length
+    if (length == kHttp) {
+        return fail(ErrorCode::malformed,
+                    "frame: the peer speaks HTTP: the native protocol has a port of its own");
+    }
     if (length > limits_.frame_bytes_max) {
         return fail(ErrorCode::too_large, "frame: " + std::to_string(length) + " bytes, at most " +
                                               std::to_string(limits_.frame_bytes_max) +

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <span>
 #include <string>
 #include <string_view>
@@ -38,20 +39,37 @@ Result<std::int64_t> parse_integer(std::string_view text, IntegerBounds bounds) 
     return value;
 }
 
-}  // namespace
+Result<double> parse_number(std::string_view text, double least, double most) {
+    const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
+    const std::string_view digits = plus ? text.substr(1) : text;
+    double value = 0;
+    const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::invalid_argument || stop != digits.data() + digits.size()) {
+        return fail(ErrorCode::invalid_argument, quoted(text) + " is not a number");
+    }
+    // "nan" is within no bounds.
+    if (error != std::errc() || !(value >= least && value <= most)) {
+        std::array<char, 64> bounds{};
+        std::snprintf(bounds.data(), bounds.size(), "%.15g..%.15g", least, most);
+        return fail(ErrorCode::out_of_range, quoted(text) + " is not within " + bounds.data());
+    }
+    return value;
+}
 
-Result<void> parse_integers(std::span<std::int64_t> out, std::string_view text,
-                            IntegerBounds bounds) {
+/// Fills `out` from as many parts with commas between.
+template <typename T, typename Parse>
+Result<void> parse_list(std::span<T> out, std::string_view text, std::string_view what,
+                        Parse parse) {
     std::string_view rest = text;
     for (std::size_t i = 0; i < out.size(); ++i) {
         const std::size_t comma = rest.find(',');
         const bool last = i + 1 == out.size();
         if (last != (comma == rest.npos)) {
-            return fail(ErrorCode::invalid_argument, quoted(text) + " is not " +
-                                                         std::to_string(out.size()) +
-                                                         " integers with commas between");
+            return fail(ErrorCode::invalid_argument,
+                        quoted(text) + " is not " + std::to_string(out.size()) + " " +
+                            std::string(what) + " with commas between");
         }
-        const auto value = parse_integer(rest.substr(0, comma), bounds);
+        const auto value = parse(rest.substr(0, comma));
         if (!value) {
             return tl::unexpected(value.error());
         }
@@ -59,6 +77,20 @@ Result<void> parse_integers(std::span<std::int64_t> out, std::string_view text,
         rest = last ? std::string_view() : rest.substr(comma + 1);
     }
     return {};
+}
+
+}  // namespace
+
+Result<void> parse_integers(std::span<std::int64_t> out, std::string_view text,
+                            IntegerBounds bounds) {
+    return parse_list(out, text, "integers",
+                      [&](std::string_view one) { return parse_integer(one, bounds); });
+}
+
+Result<void> parse_numbers(std::span<double> out, std::string_view text, double least,
+                           double most) {
+    return parse_list(out, text, "numbers",
+                      [&](std::string_view one) { return parse_number(one, least, most); });
 }
 
 Result<ColumnPos> parse_column(std::string_view text) {

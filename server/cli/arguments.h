@@ -39,6 +39,9 @@ struct StackRectangle {
 Result<void> parse_integers(std::span<std::int64_t> out, std::string_view text,
                             IntegerBounds bounds);
 
+/// Likewise numbers from "1.5,-2,3e2", both bounds included.
+Result<void> parse_numbers(std::span<double> out, std::string_view text, double least, double most);
+
 /// "X,Z" as a column, |x| and |z| below 2^53.
 Result<ColumnPos> parse_column(std::string_view text);
 

@@ -24,9 +24,9 @@ namespace {
 
 struct PictureOptions {
     std::string world;
-    std::array<double, 3> eye{};
-    std::array<double, 3> look{};
-    std::array<std::int32_t, 2> size = {1280, 720};
+    std::string eye;
+    std::string look;
+    std::string size = "1280,720";
     double field_of_view = 55;
     std::string block;
     std::string out;
@@ -37,13 +37,43 @@ int wrong_use(const Error& error) {
     return kExitWrongUse;
 }
 
+/// The view that the options ask for, but for a block.
+Result<PictureView> view_of(const PictureOptions& options) {
+    constexpr double kFarthest = 9e15;
+    std::array<double, 3> eye{};
+    std::array<double, 3> look{};
+    std::array<std::int64_t, 2> size{};
+    const auto named = [](const char* flag) {
+        return [flag](const Error& error) {
+            return Error{.code = error.code, .message = flag + (" " + error.message)};
+        };
+    };
+    return parse_numbers(eye, options.eye, -kFarthest, kFarthest)
+        .map_error(named("--eye"))
+        .and_then([&] {
+            return parse_numbers(look, options.look, -kFarthest, kFarthest)
+                .map_error(named("--look"));
+        })
+        .and_then([&] {
+            return parse_integers(size, options.size, {.least = 1, .most = kImageSideMax})
+                .map_error(named("--size"));
+        })
+        .map([&] {
+            return PictureView{.eye = {eye[0], eye[1], eye[2]},
+                               .look = {look[0], look[1], look[2]},
+                               .width = static_cast<std::int32_t>(size[0]),
+                               .height = static_cast<std::int32_t>(size[1]),
+                               .field_of_view = options.field_of_view,
+                               .block = {}};
+        });
+}
+
 int run_picture(const PictureOptions& options) {
-    PictureView view{.eye = {options.eye[0], options.eye[1], options.eye[2]},
-                     .look = {options.look[0], options.look[1], options.look[2]},
-                     .width = options.size[0],
-                     .height = options.size[1],
-                     .field_of_view = options.field_of_view,
-                     .block = {}};
+    const auto asked = view_of(options);
+    if (!asked) {
+        return wrong_use(asked.error());
+    }
+    PictureView view = *asked;
     if (!options.block.empty()) {
         std::array<std::int64_t, 4> sides{};
         if (const auto parsed = parse_integers(sides, options.block, kColumnBounds); !parsed) {
@@ -79,19 +109,14 @@ int run_picture(const PictureOptions& options) {
 void add_picture_command(CLI::App& app, int& exit_code) {
     const auto options = std::make_shared<PictureOptions>();
     CLI::App* picture = app.add_subcommand("picture", "Draw the terrain as seen from a place");
-    const auto numbers = CLI::Range(-9e15, 9e15);
     picture->add_option("--world", options->world, "World file")->required();
-    picture->add_option("--eye", options->eye, "Where to stand, voxels: X,Y,Z; Y is up")
-        ->delimiter(',')
-        ->required()
-        ->check(numbers);
-    picture->add_option("--look", options->look, "What to look at: X,Y,Z")
-        ->delimiter(',')
-        ->required()
-        ->check(numbers);
-    picture->add_option("--size", options->size, "Pixels: W,H; 1280,720 if absent")
-        ->delimiter(',')
-        ->check(CLI::Range(std::int64_t{1}, kImageSideMax));
+    picture->add_option("--eye", options->eye, "Where to stand, voxels; Y is up")
+        ->type_name("X,Y,Z")
+        ->required();
+    picture->add_option("--look", options->look, "What to look at")->type_name("X,Y,Z")->required();
+    picture->add_option("--size", options->size, "Pixels; at most 33,554,432 in all")
+        ->type_name("W,H")
+        ->capture_default_str();
     picture->add_option("--fov", options->field_of_view, "Degrees along the longer side")
         ->check(CLI::Range(1.0, 150.0))
         ->capture_default_str();

@@ -27,12 +27,16 @@ struct ReportCommand {
     bool quick = false;
 };
 
-Result<void> write_all(const Page& page, const std::filesystem::path& folder) {
+Result<void> make_folder(const std::filesystem::path& folder) {
     std::error_code refused;
     std::filesystem::create_directories(folder, refused);
     if (refused) {
         return fail(ErrorCode::io_error, folder.string() + ": " + refused.message());
     }
+    return {};
+}
+
+Result<void> write_all(const Page& page, const std::filesystem::path& folder) {
     for (const ReportFile& file : page.pictures()) {
         if (auto written = write_file(folder / file.name, file.bytes); !written) {
             return written;
@@ -47,8 +51,11 @@ int run_report(const ReportCommand& command) {
     const Stopwatch watch;
     ReportOptions options = command.quick ? quick_report() : ReportOptions{};
     options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
-    const auto page = make_report(options, [&](const std::string& what) {
-        std::fprintf(stderr, "%6.1f s  %s\n", watch.milliseconds() / 1000, what.c_str());
+    // First, so that nobody waits for what then has no place to go.
+    const auto page = make_folder(command.out).and_then([&] {
+        return make_report(options, [&](const std::string& what) {
+            std::fprintf(stderr, "%6.1f s  %s\n", watch.milliseconds() / 1000, what.c_str());
+        });
     });
     auto written = page ? write_all(*page, command.out) : tl::unexpected(page.error());
     if (!written) {

@@ -119,7 +119,13 @@ std::string structure_text(const StructureParameters& structure) {
                                   : "veins lie in the rock without lifting it");
 }
 
-std::string relief_text(const ReliefParameters& relief) {
+bool has_material(const WorldDefinition& definition, MaterialKind kind) {
+    return std::any_of(definition.materials.begin(), definition.materials.end(),
+                       [&](const Material& material) { return material.kind == kind; });
+}
+
+std::string relief_text(const WorldDefinition& definition) {
+    const ReliefParameters& relief = definition.relief;
     if (relief.height <= 0) {
         return "none: the ground is the top of the stack";
     }
@@ -130,8 +136,15 @@ std::string relief_text(const ReliefParameters& relief) {
                        " and " + short_text(relief.ground + relief.fall) +
                        ", plains and mountains " + short_text(relief.province) + " columns apart";
     text += relief.plateau >= 0.5 ? "; table lands" : "; ridges";
+    if (relief.ground + relief.fall + relief.height > definition.terrain.depth) {
+        text += "; nothing stands above the top of the layers, whose depth is " +
+                short_text(definition.terrain.depth);
+    }
     if (relief.rivers > 0) {
         text += "; rivers some " + short_text(2 * relief.rivers) + " columns wide and more";
+    }
+    if ((relief.rivers > 0 || relief.sea_level) && !has_material(definition, MaterialKind::water)) {
+        text += ", but dry: no material is of kind water";
     }
     if (relief.gullies > 0) {
         text += "; gullies " + short_text(relief.gullies) + " deep";
@@ -144,6 +157,9 @@ std::string relief_text(const ReliefParameters& relief) {
     }
     if (relief.soil > 0) {
         text += "; up to " + short_text(relief.soil) + " of soil";
+        text += has_material(definition, MaterialKind::soil)
+                    ? ""
+                    : ", but none is there: no material is of kind soil";
     }
     if (relief.sea_level) {
         text += "; the sea stands at " + short_text(*relief.sea_level);
@@ -171,24 +187,40 @@ Json landscape_json(const WorldDefinition& definition) {
     const StructureParameters& structure = definition.structure;
     const ReliefParameters& relief = definition.relief;
     const CaveParameters& caves = definition.caves;
-    Json json = {
-        {"structure",
-         {{"fold", structure.fold},
-          {"fold_length", structure.fold_length},
-          {"fault_density", structure.fault_density},
-          {"fault_throw", structure.fault_throw},
-          {"sheet", structure.sheet},
-          {"lift", structure.lift}}},
-        {"relief",
-         {{"height", relief.height},
-          {"ground", relief.ground},
-          {"fall", relief.fall},
-          {"valley", relief.valley},
-          {"rivers", relief.rivers},
-          {"cliffs", relief.cliffs},
-          {"overhang", relief.overhang},
-          {"soil", relief.soil}}},
-        {"caves", {{"cell", caves.cell}, {"radius", caves.radius}, {"levels", caves.levels}}}};
+    Json json = {{"structure",
+                  {{"fold", structure.fold},
+                   {"fold_length", structure.fold_length},
+                   {"fold_direction", structure.fold_direction},
+                   {"fault_density", structure.fault_density},
+                   {"fault_throw", structure.fault_throw},
+                   {"fault_length", structure.fault_length},
+                   {"fault_dip", structure.fault_dip},
+                   {"sheet", structure.sheet},
+                   {"lift", structure.lift}}},
+                 {"relief",
+                  {{"height", relief.height},
+                   {"ground", relief.ground},
+                   {"fall", relief.fall},
+                   {"valley", relief.valley},
+                   {"province", relief.province},
+                   {"plateau", relief.plateau},
+                   {"rivers", relief.rivers},
+                   {"gullies", relief.gullies},
+                   {"gully_scale", relief.gully_scale},
+                   {"gully_octaves", relief.gully_octaves},
+                   {"cliffs", relief.cliffs},
+                   {"overhang", relief.overhang},
+                   {"soil", relief.soil}}},
+                 {"caves",
+                  {{"cell", caves.cell},
+                   {"radius", caves.radius},
+                   {"density", caves.density},
+                   {"connect", caves.connect},
+                   {"shaft", caves.shaft},
+                   {"chamber", caves.chamber},
+                   {"sink", caves.sink},
+                   {"levels", caves.levels},
+                   {"water_table", caves.water_table}}}};
     if (relief.sea_level) {
         json["relief"]["sea_level"] = *relief.sea_level;
     }
@@ -225,7 +257,7 @@ std::string world_report_text(const World& world) {
                             fixed_text(stack.reference_caves, 2) + " caves");
     if (definition.format >= 2) {
         line("structure", structure_text(definition.structure));
-        line("relief", relief_text(definition.relief));
+        line("relief", relief_text(definition));
         line("cave systems", caves_text(definition.caves));
     }
     out +=

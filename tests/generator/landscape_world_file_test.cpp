@@ -129,6 +129,9 @@ TEST(LandscapeWorldFile, RefusesWithPlaceAndReason) {
     EXPECT_THAT(faults_of(2, "hardness = 2\n"),
                 ElementsAre("w.toml:43:12: material.hardness: is 2; it must be a number from 0 to "
                             "1"));
+    EXPECT_THAT(faults_of(2, "[relief]\nheight = 9\nground = 50\nfall = 11\n"),
+                ElementsAre("w.toml:45:10: relief.ground: and fall bring rivers to height 61; they "
+                            "must run in the layers, whose depth is 60"));
     const std::string soil =
         "[[material]]\nid = 9\nname = \"a\"\ncolor = \"#0000ff\"\nkind = \"soil\"\n"
         "[[material]]\nid = 10\nname = \"b\"\ncolor = \"#0000ff\"\nkind = \"soil\"\n";
@@ -139,8 +142,7 @@ TEST(LandscapeWorldFile, RefusesWithPlaceAndReason) {
 
 TEST(LandscapeWorldFile, IsRefusedAboveTheHeightBound) {
     auto parsed = parse_world_file(
-        world_text(2, "[relief]\nheight = 2048\ngullies = 512\nground = 4096\nfall = 4096\n"), "w",
-        "");
+        world_text(2, "[relief]\nheight = 2048\ngullies = 512\nground = 30\nfall = 30\n"), "w", "");
     ASSERT_TRUE(parsed.ok());
     const auto world = World::build(parsed.definition);
     EXPECT_TRUE(world);

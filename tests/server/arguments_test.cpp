@@ -42,6 +42,15 @@ TEST(Arguments, AsManyIntegersAsAskedFor) {
     EXPECT_FALSE(parse_integers(three, "1,2,2147483648", kChunkBounds));
 }
 
+TEST(Arguments, NumbersWithTheirBounds) {
+    std::array<double, 3> three{};
+    ASSERT_TRUE(parse_numbers(three, "1.5,-2,+3e1", -30, 30));
+    EXPECT_EQ(three, (std::array<double, 3>{1.5, -2, 30}));
+    for (const char* bad : {"1,2", "1,2,3,4", "1,2,31", "1,,3", "1,2,nan", "1,2,3x", ""}) {
+        EXPECT_FALSE(parse_numbers(three, bad, -30, 30)) << bad;
+    }
+}
+
 TEST(Arguments, RectanglesExcludeTheirEnd) {
     EXPECT_EQ(
         parse_stack_rectangle("-2147483648,0,2147483648,1").value(),

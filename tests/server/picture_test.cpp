@@ -117,6 +117,14 @@ TEST(Picture, TheProgramWritesAPngOrSaysWrongUse) {
     EXPECT_EQ(
         run({"picture", "--world", world, "--eye", "0,1,0", "--look", "9,9,9", "-o", out.string()}),
         kExitWrongUse);
+    for (const char* size : {"16x9", "16", "16,0", "16,9,1"}) {
+        EXPECT_EQ(run({"picture", "--world", world, "--eye=-3.5,70,2", "--look", "9,40,9", "--size",
+                       size, "-o", out.string()}),
+                  kExitWrongUse);
+    }
+    EXPECT_EQ(run({"picture", "--world", world, "--eye=nan,70,2", "--look", "9,40,9", "-o",
+                   out.string()}),
+              kExitWrongUse);
     EXPECT_FALSE(std::filesystem::exists(out));
     EXPECT_EQ(run({"picture", "--world", world, "--eye=-3.5,70,2", "--look", "9,40,9", "--size",
                    "16,9", "-o", out.string()}),

@@ -115,6 +115,21 @@ TEST_F(WorldCommand, InitWritesAWorldWithoutFaultsThatShowUnderstands) {
     EXPECT_THAT(shown.out, HasSubstr("my world"));
 }
 
+TEST_F(WorldCommand, ShowSaysWhatALandscapeLacks) {
+    std::string text(example_world());
+    for (const std::string kind : {"water", "soil"}) {
+        const std::size_t at = text.find("kind = \"" + kind + "\"");
+        ASSERT_NE(at, std::string::npos);
+        const std::size_t begin = text.rfind("[[material]]", at);
+        text.erase(begin, text.find("\n\n", at) + 2 - begin);
+    }
+    const Outcome shown = run_world({"show", write("dry.toml", text)});
+    EXPECT_EQ(shown.exit_code, kExitDone) << shown.error;
+    EXPECT_THAT(shown.out, HasSubstr("but dry: no material is of kind water"));
+    EXPECT_THAT(shown.out, HasSubstr("no material is of kind soil"));
+    EXPECT_THAT(shown.out, HasSubstr("nothing stands above the top of the layers"));
+}
+
 TEST_F(WorldCommand, InitLeavesAnExistingFileAlone) {
     const std::string path = write("mine.toml", "my work");
     const Outcome outcome = run_world({"init", path});

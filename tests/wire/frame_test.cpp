@@ -6,6 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
 
 namespace terrane {
 namespace {
@@ -134,6 +137,15 @@ TEST(Frame, LengthsBeyondTheLimitAreRefusedFromTheirFourBytesAlone) {
         EXPECT_EQ(error->code, ErrorCode::too_large);
         EXPECT_NE(error->message.find(std::to_string(length)), std::string::npos);
     }
+}
+
+TEST(Frame, AnAnswerOfHttpIsToldFromALongFrame) {
+    const std::string_view answer = "HTTP/1.1 400 Bad Request";
+    FrameReader reader(kOutboundFrameLimits);
+    const auto error = drain(reader, std::as_bytes(std::span(answer)));
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code, ErrorCode::malformed);
+    EXPECT_NE(error->message.find("speaks HTTP"), std::string::npos);
 }
 
 TEST(Frame, TheGreatestLengthIsWaitedFor) {
