@@ -86,8 +86,10 @@ Raster::Seen Raster::seen(const RasterVertex& vertex) const {
     const float open = 0.5F + 0.5F * vertex.normal.y;
     const glm::vec3 light = kSunLight * sun + glm::mix(kGroundLight, kSkyLight, open);
     const glm::vec3 color(vertex.color.r, vertex.color.g, vertex.color.b);
-    const float share = glm::length(vertex.from_eye) / static_cast<float>(camera_.horizon_voxels);
-    const float haze = 1 - std::exp(-4 * share * share);
+    const float share = glm::length(glm::vec2(vertex.from_eye.x, vertex.from_eye.z)) /
+                        static_cast<float>(camera_.horizon_voxels);
+    // Clear over most of the way, so that a small radius is no fog.
+    const float haze = 1 - std::exp(-4 * share * share * share * share);
     const glm::vec3 direction = glm::normalize(vertex.from_eye);
     return {
         .place = glm::vec3(glm::dot(place, right_), glm::dot(place, up_), glm::dot(place, ahead_)),
