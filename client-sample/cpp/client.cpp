@@ -224,25 +224,14 @@ Result<void> Client::Session::send_what_is_due() {
 /// The next message of what has been received, its payload copied out; nothing if it is not whole
 /// yet.
 Result<std::optional<AnyMessage>> Client::Session::read_message(Bytes& payload) {
-    for (;;) {
-        const auto next = reader_.next();
-        if (!next) {
-            return tl::unexpected(next.error());
+    return next_message(reader_).map([&](std::optional<IncomingMessage> next) {
+        std::optional<AnyMessage> message;
+        if (next) {
+            payload.assign(next->payload.begin(), next->payload.end());
+            message = std::move(next->message);
         }
-        const std::optional<Frame>& frame = *next;
-        if (!frame) {
-            return std::nullopt;
-        }
-        if (!is_known(*frame)) {  // a newer server's: passed over
-            continue;
-        }
-        auto message = decode_message(*frame);
-        if (!message) {
-            return tl::unexpected(message.error());
-        }
-        payload.assign(frame->payload.begin(), frame->payload.end());
-        return std::move(*message);
-    }
+        return message;
+    });
 }
 
 Result<void> Client::Session::receive(Deadline deadline) {

@@ -1,7 +1,12 @@
 #include "protocol/wire/messages.h"
 
+#include "protocol/base/result.h"
+#include "protocol/wire/frame.h"
+
 #include <array>
+#include <optional>
 #include <string_view>
+#include <utility>
 #include <variant>
 
 namespace terrane {
@@ -53,6 +58,27 @@ std::string_view name_of(const AnyMessage& message) {
         "Column",      "WorldQuery",  "WorldDefinition", "Failure",     "Ping",  "Pong",
         "Goodbye",     "ViewUpdate",  "ChunkForget",     "Credit"};
     return kNames[message.index()];
+}
+
+Result<std::optional<IncomingMessage>> next_message(FrameReader& reader) {
+    for (;;) {
+        const auto next = reader.next();
+        if (!next) {
+            return tl::unexpected(next.error());
+        }
+        const std::optional<Frame>& frame = *next;
+        if (!frame) {
+            return std::nullopt;
+        }
+        if (!is_known(*frame)) {  // a newer server's: passed over
+            continue;
+        }
+        auto message = decode_message(*frame);
+        if (!message) {
+            return tl::unexpected(message.error());
+        }
+        return IncomingMessage{.message = std::move(*message), .payload = frame->payload};
+    }
 }
 
 }  // namespace terrane

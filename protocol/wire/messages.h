@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -279,6 +280,16 @@ Result<AnyMessage> decode_message(const Frame& frame);
 /// Whether the frame is of a kind that this build knows: a client passes over others, which a newer
 /// server may send.
 bool is_known(const Frame& frame);
+
+/// A message and what followed it; the payload lives until its reader is used again.
+struct IncomingMessage {
+    AnyMessage message;
+    std::span<const std::byte> payload;
+};
+
+/// The next whole message of what `reader` was fed, nothing if more bytes are needed. Messages of
+/// newer peers are passed over: for clients. Fails as FrameReader::next and decode_message do.
+Result<std::optional<IncomingMessage>> next_message(FrameReader& reader);
 
 /// The request id in a frame's head, 0 if that kind of message has none: what a Failure about a
 /// message that did not decode refers to.

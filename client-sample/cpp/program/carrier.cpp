@@ -18,27 +18,6 @@ namespace terrane {
 
 namespace {
 
-Result<std::optional<CarriedMessage>> next_message(FrameReader& reader) {
-    for (;;) {
-        const auto next = reader.next();
-        if (!next) {
-            return tl::unexpected(next.error());
-        }
-        const std::optional<Frame>& frame = *next;
-        if (!frame) {
-            return std::nullopt;
-        }
-        if (!is_known(*frame)) {  // a newer server's: passed over
-            continue;
-        }
-        auto message = decode_message(*frame);
-        if (!message) {
-            return tl::unexpected(message.error());
-        }
-        return CarriedMessage{.message = std::move(*message), .payload = frame->payload};
-    }
-}
-
 class TcpCarrier final : public Carrier {
   public:
     Bytes opening() override { return {}; }
@@ -50,7 +29,7 @@ class TcpCarrier final : public Carrier {
         return {};
     }
 
-    Result<std::optional<CarriedMessage>> next() override { return next_message(reader_); }
+    Result<std::optional<IncomingMessage>> next() override { return next_message(reader_); }
 
   private:
     FrameReader reader_{kOutboundFrameLimits};
@@ -77,7 +56,7 @@ class WebSocketCarrier final : public Carrier {
         return {};
     }
 
-    Result<std::optional<CarriedMessage>> next() override { return next_message(reader_); }
+    Result<std::optional<IncomingMessage>> next() override { return next_message(reader_); }
 
     Bytes take_reply() override { return stream_.take_reply(); }
 

@@ -17,12 +17,6 @@ namespace terrane {
 
 enum class CarrierKind : std::uint8_t { tcp, web_socket, http };
 
-/// A message and what followed it; the payload lives until the carrier's next call.
-struct CarriedMessage {
-    AnyMessage message;
-    std::span<const std::byte> payload;
-};
-
 /// One connection's, from its first byte on. One thread.
 class Carrier {
   public:
@@ -38,8 +32,9 @@ class Carrier {
     /// Takes what the connection brought. Fails if the peer refuses or breaks the carrier's rules.
     virtual Result<void> feed(std::span<const std::byte> bytes) = 0;
 
-    /// The next whole message; nothing if more bytes are needed.
-    virtual Result<std::optional<CarriedMessage>> next() = 0;
+    /// The next whole message; nothing if more bytes are needed. Its payload lives until the next
+    /// call.
+    virtual Result<std::optional<IncomingMessage>> next() = 0;
 
     /// What the carrier itself wants to say, a pong or the next request; empty if nothing. To be
     /// asked for after every `next` that gave something.

@@ -155,7 +155,7 @@ Result<bool> HttpCarrier::read(Response& response) {
     return true;
 }
 
-Result<std::optional<CarriedMessage>> HttpCarrier::next() {
+Result<std::optional<IncomingMessage>> HttpCarrier::next() {
     if (!asked_) {
         if (taken_bytes_ < buffer_.size()) {
             return fail(ErrorCode::malformed, "HTTP: bytes that nobody asked for");
@@ -179,8 +179,8 @@ Result<std::optional<CarriedMessage>> HttpCarrier::next() {
         return tl::unexpected(message.error());
     }
     const bool has_payload = std::holds_alternative<ChunkAnswer>(*message);
-    return CarriedMessage{.message = std::move(*message),
-                          .payload = has_payload ? response.body : std::span<const std::byte>()};
+    return IncomingMessage{.message = std::move(*message),
+                           .payload = has_payload ? response.body : std::span<const std::byte>()};
 }
 
 Result<AnyMessage> HttpCarrier::message_of(const Ask& ask, const Response& response) {

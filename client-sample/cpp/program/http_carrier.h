@@ -24,7 +24,7 @@ class HttpCarrier final : public Carrier {
     /// Hello, world query and chunk requests; others need no answer and are left out.
     Bytes wrap(const AnyMessage& message) override;
     Result<void> feed(std::span<const std::byte> bytes) override;
-    Result<std::optional<CarriedMessage>> next() override;
+    Result<std::optional<IncomingMessage>> next() override;
 
     /// The next request, once the last has been answered.
     Bytes take_reply() override;

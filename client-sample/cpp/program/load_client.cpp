@@ -215,7 +215,7 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
         if (!next) {
             return tl::unexpected(next.error());
         }
-        std::optional<CarriedMessage>& carried = *next;
+        std::optional<IncomingMessage>& carried = *next;
         if (!carried) {
             break;
         }
@@ -236,7 +236,7 @@ Result<void> LoadClient::receive(std::span<const std::byte> bytes, Clock::time_p
     return {};
 }
 
-Result<void> LoadClient::take(CarriedMessage& carried, Clock::time_point now) {
+Result<void> LoadClient::take(IncomingMessage& carried, Clock::time_point now) {
     AnyMessage& message = carried.message;
     if (const auto* chunk = std::get_if<ChunkAnswer>(&message); chunk != nullptr && hello_) {
         take_chunk(*hello_, *chunk, carried.payload, now);

@@ -125,7 +125,7 @@ class LoadClient {
     void ask(const WireLimits& limits, Clock::time_point now);
     void account_wanting(Clock::time_point now);
     void settle(ChunkPos key);
-    Result<void> take(CarriedMessage& carried, Clock::time_point now);
+    Result<void> take(IncomingMessage& carried, Clock::time_point now);
     void take_chunk(const ServerHello& world, const ChunkAnswer& answer,
                     std::span<const std::byte> payload, Clock::time_point now);
     Result<void> take_failure(const Failure& failure, Clock::time_point now);
