@@ -12,7 +12,7 @@
 // down to the ground; a gap under kGapLeast is filled. One overhang a column, level 0 only. There
 // is none where the ground is no longer the rock's: where pf < .27, as for lips, and where a river
 // or a sinkhole has cut more than kCutMost into it; or ledges would hang in the air before their
-// hill. Lips are told by what the land was before those, so that some 4 in 100,000 columns of
+// hill. Lips are told by what the land was before those, so that some 6 in 100,000 columns of
 // ledges still do.
 #pragma once
 
